@@ -20,6 +20,7 @@ class FoundPort:
     device: str  # its device file, whose number may change
     path: str  # what `port` under `[projector]` and `[mirror]` takes: a name that stays
     description: str  # of the adapter, for people
+    maker: str  # of a USB adapter, as it says itself; else empty
     usb_serial: str  # serial number of a USB adapter, not of the device behind it; else empty
 
 
@@ -44,6 +45,7 @@ def list_serial_ports(links: Path = _LINKS, ttys: Path = _TTYS) -> Listing[Found
                 port.device,
                 _lasting_name(port.device, links),
                 port.description if port.description not in (None, "n/a") else "built-in port",
+                port.manufacturer or "",
                 port.serial_number or "",
             )
         )

@@ -108,9 +108,10 @@ def _facts(device: "Device") -> tuple[str, list[tuple[str, Sequence[str]]]]:
         case InstalledCamera():
             return device.backend, [("package", [device.package]), ("factory", [device.factory])]
         case FoundPort():
-            adapter = f", {_serial_text(device.usb_serial)}" if device.usb_serial else ""
+            serial = f", {_serial_text(device.usb_serial)}" if device.usb_serial else ""
             paths = list(dict.fromkeys((device.device, device.path)))
-            return f"{device.description}{adapter}", [("port", paths)]
+            makers = [device.maker] if device.maker else []
+            return f"{device.description}{serial}", [("port", paths), ("maker", makers)]
         case _:
             size = f"{device.width}x{device.height} at +{device.left}+{device.top}"
             return device.name, [("size", [size])]

@@ -1,8 +1,7 @@
 """Lists all connected devices, and makes the TOML that chooses each."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 from drivers.discovery import (
     FoundPort,
@@ -18,6 +17,12 @@ from drivers.v4l_names import V4lNames
 from drivers.window_outputs import Output
 from navapp.config import format_table
 from navapp.inventory.camera_packages import InstalledCamera, list_installed
+
+# What a serial port may lead to: in words, table, backend.
+_PORT_USES = (
+    ("a projector that speaks ESC/VP21 (Epson)", "projector", "escvp21"),
+    ("the mirror's rotary stage, if it speaks Zaber's ASCII protocol", "mirror", "zaber"),
+)
 
 Device = UsbCamera | OakCamera | InstalledCamera | FoundPort | Output
 
@@ -49,7 +54,11 @@ def list_all_devices(names: V4lNames | None = None) -> Inventory:
 
 
 def make_choice_toml(device: Device) -> str:
-    """TOML that chooses a device; empty when it cannot be chosen."""
+    """TOML that chooses a device; empty when it cannot be chosen.
+
+    Of a serial port every use is a comment: what is behind its adapter is not known, as asking
+    would disturb it.
+    """
     match device:
         case UsbCamera(chosen_by=""):
             return ""
@@ -62,11 +71,19 @@ def make_choice_toml(device: Device) -> str:
         case InstalledCamera(backend=name):
             return _camera(name)
         case FoundPort(path=path):
-            keys: Mapping[str, Any] = {"backend": "escvp21", "port": path}
-            return f'{format_table("projector", keys)}\n# or [mirror] with backend = "zaber"'
+            return "\n".join(_port_uses(path))
         case Output(name=name, width=width, height=height):
-            keys = {"backend": "window", "output": name, "size_px": (width, height)}
-            return format_table("display", keys)
+            return format_table(
+                "display", {"backend": "window", "output": name, "size_px": (width, height)}
+            )
+
+
+def _port_uses(path: str) -> Iterator[str]:
+    yield "# what is behind it is not known; where it is one of these, take its lines"
+    for words, table, backend in _PORT_USES:
+        yield f"## {words}:"
+        for line in format_table(table, {"backend": backend, "port": path}).splitlines():
+            yield f"# {line}"
 
 
 def _camera(backend: str) -> str:

@@ -12,7 +12,7 @@ KINDS = {
     "usb_cameras": {"node", "path", "chosen_by", "serial", "card", "formats"},
     "oak_cameras": {"device_id", "port", "is_in_use"},
     "installed_cameras": {"backend", "factory", "package"},
-    "serial_ports": {"device", "path", "description", "usb_serial"},
+    "serial_ports": {"device", "path", "description", "maker", "usb_serial"},
     "displays": {"index", "name", "left", "top", "width", "height"},
 }
 
@@ -40,10 +40,16 @@ SERIAL_PORT = """\
   FT232R, serial number A50285BI
     port     /dev/ttyUSB0
              /dev/serial/by-id/usb-FT
-    choose   [projector]
-             backend = "escvp21"
-             port = "/dev/serial/by-id/usb-FT"
-             # or [mirror] with backend = "zaber"
+    maker    FTDI
+    choose   # what is behind it is not known; where it is one of these, take its lines
+             ## a projector that speaks ESC/VP21 (Epson):
+             # [projector]
+             # backend = "escvp21"
+             # port = "/dev/serial/by-id/usb-FT"
+             ## the mirror's rotary stage, if it speaks Zaber's ASCII protocol:
+             # [mirror]
+             # backend = "zaber"
+             # port = "/dev/serial/by-id/usb-FT"
 """
 
 

@@ -27,7 +27,7 @@ USB = UsbCamera(
 )
 OAK = OakCamera("14442C10D13EABCE00", "1.2", is_in_use=True)
 ACME = InstalledCamera("acme", "acme:make", "acme 1.0")
-PORT = FoundPort("/dev/ttyUSB0", "/dev/serial/by-id/usb-FT", "FT232R", "A50285BI")
+PORT = FoundPort("/dev/ttyUSB0", "/dev/serial/by-id/usb-FT", "FT232R", "FTDI", "A50285BI")
 DESK = Output(0, 'DELL 24"', 0, 0, 1920, 1200)
 BEAMER = Output(1, "EPSON PJ", 1920, 0, 1280, 720)
 

@@ -2,7 +2,7 @@ import tomllib
 
 import pytest
 
-from navapp.config import parse
+from navapp.config import Configuration, parse
 from navapp.inventory.connected_devices import make_choice_toml
 from tests.inventory.inventories import ACME, BEAMER, DESK, EVERYTHING, OAK, PORT, USB
 
@@ -13,7 +13,6 @@ from tests.inventory.inventories import ACME, BEAMER, DESK, EVERYTHING, OAK, POR
         (USB, "camera", {"backend": "opencv"}),
         (OAK, "camera", {"backend": "depthai"}),
         (ACME, "camera", {"backend": "acme"}),
-        (PORT, "projector", {"backend": "escvp21", "port": PORT.path}),
         (DESK, "display", {"output": 'DELL 24"', "size_px": (1920, 1200)}),
         (BEAMER, "display", {"backend": "window", "output": "EPSON PJ"}),
     ],
@@ -29,11 +28,20 @@ def test_cameras_are_chosen_by_what_stays():
     assert cameras[1].depthai.device == OAK.device_id
 
 
-def test_a_commented_line_becomes_the_right_eye_or_the_mirror():
+def test_a_commented_line_becomes_the_right_eye():
     right = make_choice_toml(USB).splitlines()[-1].removeprefix("# ")
     configuration = parse(tomllib.loads(f'[camera.opencv]\nleft = "L"\n{right}'), "x")
     assert configuration.camera.opencv.right == "A1"
-    assert make_choice_toml(PORT).splitlines()[-1] == '# or [mirror] with backend = "zaber"'
+
+
+def test_a_port_is_claimed_by_nothing_until_a_person_takes_its_lines():
+    text = make_choice_toml(PORT)
+    assert parse(tomllib.loads(text), "x") == Configuration()
+    words, *lines = (line for line in text.splitlines() if not line.startswith("##"))
+    assert words.startswith("# what is behind it is not known")
+    taken = parse(tomllib.loads("\n".join(line.removeprefix("# ") for line in lines)), "x")
+    assert (taken.projector.backend, taken.projector.port) == ("escvp21", PORT.path)
+    assert (taken.mirror.backend, taken.mirror.port) == ("zaber", PORT.path)
 
 
 def test_a_camera_without_a_lasting_name_is_not_chosen():

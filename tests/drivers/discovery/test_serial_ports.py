@@ -16,11 +16,15 @@ class Desk:
         (root / "dev").mkdir()
         monkeypatch.setattr(list_ports, "comports", lambda: self.ports)
 
-    def plug(self, name, description="n/a", vid=None, serial=None):
+    def plug(self, name, description="n/a", vid=None, serial=None, maker=None):
         device = self.root / "dev" / name
         device.touch()
         port = SimpleNamespace(
-            device=str(device), description=description, vid=vid, serial_number=serial
+            device=str(device),
+            description=description,
+            vid=vid,
+            serial_number=serial,
+            manufacturer=maker,
         )
         self.ports.append(port)
         return device
@@ -45,7 +49,7 @@ def desk(tmp_path, monkeypatch):
 
 
 def test_adapters_are_named_by_what_stays(desk):
-    first = desk.plug("ttyUSB1", "FT232R USB UART", 0x0403, "A50285BI")
+    first = desk.plug("ttyUSB1", "FT232R USB UART", 0x0403, "A50285BI", "FTDI")
     second = desk.plug("ttyACM0", "Epson", 0x04B8)
     by_id = desk.link("by-id", "usb-FTDI_A50285BI-if00-port0", first)
     desk.link("by-path", "pci-0-usb-0:1", first)
@@ -53,6 +57,7 @@ def test_adapters_are_named_by_what_stays(desk):
     epson, ftdi = desk.listing().found
     assert (ftdi.path, ftdi.usb_serial, ftdi.description) == (by_id, "A50285BI", "FT232R USB UART")
     assert (epson.path, epson.usb_serial) == (by_path, "")
+    assert (ftdi.maker, epson.maker) == ("FTDI", "")
 
 
 def test_a_built_in_port_is_listed_when_a_chip_is_behind_it(desk):
