@@ -175,7 +175,7 @@ class StagesSection(Section):
     """The surgical stages."""
 
     first: str = "opening"
-    """Name or number of the stage that a session starts in."""
+    """Where a session starts: opening, drilling, implant, patella or spacer, or its number."""
     check_minutes: Annotated[float, Field(gt=0.0)] = 30.0
     """How long a check on the patient counts, before a stage that asks for one is entered."""
 
