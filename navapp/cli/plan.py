@@ -23,6 +23,7 @@ examples:
   navapp plan --surface femur=femur.ply --cartilage femur=2.0:0.6 --out plans/knee
   navapp plan --surface femur=femur.ply --contents contents.toml --out plans/knee
   navapp plan --surface femur=femur.ply --markups "drill femur 8mm.mrk.json" --out plans/knee
+  navapp plan --built-in --contents docs/contents.toml --out plans/built_in
   navapp plan show plans/knee
 points are LPS in mm; look at summary.html in the plan's folder before it is used
 """
@@ -79,6 +80,9 @@ def _add_sources(parser: argparse.ArgumentParser) -> None:
         metavar="NAME=FILE",
         help="a bone's surface (PLY, LPS, mm); may be given for several bones",
     )
+    source.add_argument(
+        "--built-in", action="store_true", help="the knee of the simulated rig, its surfaces alone"
+    )
     ct = parser.add_argument_group("with --ct")
     ct.add_argument("--series", metavar="UID", help="which of several series in the folder")
     ct.add_argument(
@@ -106,7 +110,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
         given = (
             options.surface, options.cartilage, options.ct, options.labels, options.out,
             options.contents, options.markups, options.side, options.series, options.threshold,
-            options.seed, options.region, options.label,
+            options.seed, options.region, options.label, options.built_in or None,
         )  # fmt: skip
         if options.folder is None or any(one not in (None, []) for one in given):
             raise UsageError("show takes a plan folder only", remedy="navapp plan show P")
@@ -126,11 +130,16 @@ def _make_plan(options: argparse.Namespace, diagnostics: Diagnostics) -> "tuple[
     from navapp.preop import check_place, with_side, write_plan
     from navapp.values import Plan
 
-    sources = [options.ct is not None, options.labels is not None, bool(options.surface)]
+    sources = [
+        options.ct is not None,
+        options.labels is not None,
+        bool(options.surface),
+        options.built_in,
+    ]
     if sum(sources) != 1:
         raise UsageError(
             "nothing to plan from" if not any(sources) else "more than one thing to plan from",
-            remedy="give one of --ct PATH, --labels FILE, --surface NAME=FILE",
+            remedy="give one of --ct PATH, --labels FILE, --surface NAME=FILE, --built-in",
         )
     if options.out is None:
         raise UsageError("--out is missing", remedy="name the plan folder to write")
@@ -144,7 +153,7 @@ def _make_plan(options: argparse.Namespace, diagnostics: Diagnostics) -> "tuple[
     plan = replace(plan, aspects=aspects_of(bones, diagnostics))
     warnings = (*draft.origin.warnings, *about_side, *about_content)
     origin = replace(draft.origin, warnings=warnings)
-    write_plan(options.out, plan, origin, draft.slices)
+    write_plan(options.out, plan, origin, draft.slices, draft.volume)
     return plan, origin
 
 

@@ -1,7 +1,7 @@
 """Makes bone models with their origin and pictures, from a CT or a segmentation."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -11,7 +11,9 @@ from navapp.geometry.transform import FloatArray
 from navapp.preop.ct_surface import BoneSurface, make_label_surface, make_surfaces
 from navapp.preop.plan_origin import PlanOrigin
 from navapp.preop.segmentation import DEFAULT_THRESHOLD_HU, NO_SEEDS, segment
-from navapp.preop.slices import Picture, draw_slices
+from navapp.preop.slice_drawing import draw_slices
+from navapp.preop.slice_volume import SliceVolume, make_slice_volume
+from navapp.preop.slices import Picture
 from navapp.preop.volume import CtVolume, LabelVolume, ReadCt
 from navapp.values import FOLLOWED_BONES, BoneModel, Side
 
@@ -42,6 +44,7 @@ class Draft:
     side: Side | None = None  # as the user or the CT's laterality tag says; None to be estimated
     # bone -> (h, w, 3) BGR, three slices of the volume with the surface's contour.
     slices: Mapping[str, Picture] = field(default_factory=dict)
+    volume: SliceVolume | None = None  # to scroll through; None without one
 
 
 def make_draft_from_ct(
@@ -71,7 +74,8 @@ def make_draft_from_ct(
     )
     side = settings.side or read.source.side
     slices = {name: draw_slices(found.ct, surface.mesh) for name, surface in surfaces.bones.items()}
-    return _draft(surfaces.bones, side, origin, slices, surfaces.pose_sd_mm)
+    draft = _draft(surfaces.bones, side, origin, slices, surfaces.pose_sd_mm)
+    return _with_volume(draft, read.volume)
 
 
 def make_draft_from_labels(
@@ -113,7 +117,12 @@ def make_draft_from_labels(
         size=volume.size,
         warnings=tuple(warnings),
     )
-    return _draft(surfaces, side, origin, slices)
+    return _with_volume(_draft(surfaces, side, origin, slices), volume)
+
+
+def _with_volume(draft: Draft, volume: CtVolume | LabelVolume) -> Draft:
+    meshes = [bone.mesh for bone in draft.bones.values()]
+    return replace(draft, volume=make_slice_volume(volume, meshes)) if meshes else draft
 
 
 def _draft(

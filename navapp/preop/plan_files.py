@@ -2,11 +2,9 @@
 
 import hashlib
 import json
-import os
 import shutil
 import tempfile
 from collections.abc import Mapping
-from contextlib import suppress
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -22,12 +20,15 @@ from navapp.preop.bone_preview import draw_preview
 from navapp.preop.plan_content_json import content_from_json, content_to_json
 from navapp.preop.plan_integrity import make_damage_error, sha256_of
 from navapp.preop.plan_origin import PlanOrigin, origin_from_json, origin_to_json
+from navapp.preop.plan_place import PLAN_FILE, check_place, make_write_error, put_in_place
 from navapp.preop.plan_summary import make_summary_page
+from navapp.preop.plan_view import PlanView, make_plan_view
+from navapp.preop.slice_volume import SliceVolume, read_slices, write_slices
 from navapp.preop.slices import Picture
 from navapp.values import AspectGraph, BoneModel, Plan, SurgicalContent
 
-_FILE = "plan.json"
 NO_SLICES: Mapping[str, Picture] = MappingProxyType({})
+_SLICES_FILE = "slices.npz"
 _CONVENTIONS = {"format": 1, "space": "LPS", "unit": "mm"}
 
 
@@ -36,6 +37,7 @@ def write_plan(
     plan: Plan,
     origin: PlanOrigin | None = None,
     slices: Mapping[str, Picture] = NO_SLICES,
+    volume: SliceVolume | None = None,
 ) -> None:
     """Write a plan folder whole: it appears complete or not at all.
 
@@ -46,6 +48,7 @@ def write_plan(
         plan: what is written.
         origin: where its surfaces come from; None for nothing known.
         slices: bone -> (h, w, 3) BGR of its contour in the volume, for its picture.
+        volume: whose slices a person scrolls through; None: contours alone.
 
     Raises:
         PlanError: the place is taken by something that is not a plan, or cannot be written.
@@ -58,42 +61,15 @@ def write_plan(
         folder.parent.mkdir(parents=True, exist_ok=True)
         temporary = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}."))
     except OSError as error:
-        raise _not_written(folder, error) from error
+        raise make_write_error(folder, error) from error
     try:
-        _write_content(temporary, plan, origin or PlanOrigin(), slices)
+        _write_content(temporary, make_plan_view(plan, origin, volume), slices)
         temporary.chmod(0o755)
-        _put_in_place(temporary, folder)
+        put_in_place(temporary, folder)
     except OSError as error:
-        raise _not_written(folder, error) from error
+        raise make_write_error(folder, error) from error
     finally:
         shutil.rmtree(temporary, ignore_errors=True)
-
-
-def check_place(folder: str | Path, *, may_replace: bool = False) -> None:
-    """Refuse a place that is taken, before the work begins.
-
-    Raises:
-        PlanError: there is something at that place that is not a plan, or a plan that may not be
-            replaced.
-    """
-    folder = Path(folder)
-    if (folder / _FILE).is_file() and not may_replace:
-        raise PlanError(
-            f"{folder} holds a plan",
-            subject=str(folder),
-            remedy="choose a new folder for --out, or add --replace",
-        )
-    if folder.exists() and not (folder / _FILE).is_file() and any(_entries(folder)):
-        raise PlanError(
-            f"{folder} exists and is not a plan",
-            subject=str(folder),
-            remedy="choose a new folder for --out",
-        )
-    there = next(
-        place for place in (folder.absolute().parent, *folder.absolute().parents) if place.exists()
-    )
-    if not there.is_dir() or not os.access(there, os.W_OK):
-        raise _not_written(folder, PermissionError(0, "its place is not a folder to write to"))
 
 
 def read_plan(folder: str | Path) -> Plan:
@@ -103,7 +79,7 @@ def read_plan(folder: str | Path) -> Plan:
         PlanError: missing, empty, half-written or changed since it was made.
     """
     folder = Path(folder)
-    if not (folder / _FILE).is_file():
+    if not (folder / PLAN_FILE).is_file():
         raise PlanError(
             f"{folder} holds no plan",
             subject=str(folder),
@@ -111,6 +87,7 @@ def read_plan(folder: str | Path) -> Plan:
         )
     try:
         content = _read_content(folder)
+        _check_slices(folder, content)
         bones = {name: _read_bone(folder, name, entry) for name, entry in content["bones"].items()}
         plan = Plan(
             bones,
@@ -161,6 +138,27 @@ def read_origin(folder: str | Path) -> PlanOrigin:
         raise make_damage_error(folder, str(error)) from error
 
 
+def read_plan_view(folder: str | Path, plan: Plan) -> PlanView:
+    """What is needed to look at a plan that was read from a folder.
+
+    Raises:
+        PlanError: missing or damaged.
+    """
+    folder = Path(folder)
+    origin = read_origin(folder)
+    has_slices = "slices_sha256" in _read_content(folder)
+    return make_plan_view(plan, origin, read_slices(folder / _SLICES_FILE) if has_slices else None)
+
+
+def _check_slices(folder: Path, content: Mapping[str, Any]) -> None:
+    """Plans from before there were any, and those of surfaces, have none."""
+    path = folder / _SLICES_FILE
+    if "slices_sha256" in content and (
+        not path.is_file() or sha256_of(path) != content["slices_sha256"]
+    ):
+        raise make_damage_error(folder, f"{path.name} is missing or was changed")
+
+
 def _read_aspects(folder: Path, bones: Mapping[str, Any]) -> dict[str, AspectGraph]:
     aspects = {}
     for name, entry in bones.items():
@@ -174,7 +172,7 @@ def _read_aspects(folder: Path, bones: Mapping[str, Any]) -> dict[str, AspectGra
 
 
 def _read_content(folder: Path) -> dict[str, Any]:
-    content: dict[str, Any] = json.loads((folder / _FILE).read_text(encoding="utf-8"))
+    content: dict[str, Any] = json.loads((folder / PLAN_FILE).read_text(encoding="utf-8"))
     if any(content[key] != value for key, value in _CONVENTIONS.items()):
         raise PlanError(
             f"plan {folder} is of another format",
@@ -182,17 +180,12 @@ def _read_content(folder: Path) -> dict[str, Any]:
             remedy="make it again with `navapp plan`",
         )
     if "file_hash" in content and content["file_hash"] != _hash_of(content):
-        raise make_damage_error(folder, f"{_FILE} was edited")
+        raise make_damage_error(folder, f"{PLAN_FILE} was edited")
     return content
 
 
-def _entries(folder: Path) -> list[Path]:
-    return list(folder.iterdir()) if folder.is_dir() else [folder]
-
-
-def _write_content(
-    folder: Path, plan: Plan, origin: PlanOrigin, slices: Mapping[str, Picture]
-) -> None:
+def _write_content(folder: Path, view: PlanView, slices: Mapping[str, Picture]) -> None:
+    plan = view.plan
     bones: dict[str, Any] = {}
     for name, bone in plan.bones.items():
         file = f"{name}.ply"
@@ -214,12 +207,17 @@ def _write_content(
         "curves": {name: points.tolist() for name, points in plan.curves.items()},
         "approaches": {name: cone.to_json() for name, cone in plan.approaches.items()},
         "content": content_to_json(plan.content, folder),
-        "origin": origin_to_json(origin),
+        "origin": origin_to_json(view.origin),
         "hash": plan.digest,
     }
+    # Not in the digest, which tells what is shown on the patient: these are pictures for a person,
+    # and sessions recorded with a plan stay its sessions whether or not it has them.
+    if view.has_pictures:
+        write_slices(folder / _SLICES_FILE, view.volume)
+        content["slices_sha256"] = sha256_of(folder / _SLICES_FILE)
     content["file_hash"] = _hash_of(content)
-    (folder / _FILE).write_text(json.dumps(content, indent=1), encoding="utf-8")
-    page = make_summary_page(plan, origin, folder)
+    (folder / PLAN_FILE).write_text(json.dumps(content, indent=1), encoding="utf-8")
+    page = make_summary_page(view, folder)
     (folder / "summary.html").write_text(page, encoding="utf-8")
 
 
@@ -236,27 +234,6 @@ def _hash_of(content: Mapping[str, Any]) -> str:
     rest = {key: value for key, value in content.items() if key != "file_hash"}
     text = json.dumps(rest, sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode("utf-8")).hexdigest()
-
-
-def _put_in_place(temporary: Path, folder: Path) -> None:
-    """Rename; an older plan is moved aside first and put back when the rename fails."""
-    if not folder.exists():
-        temporary.rename(folder)
-        return
-    aside = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f".{folder.name}.old."))
-    try:
-        folder.rename(aside / "plan")
-        try:
-            temporary.rename(folder)
-        except OSError:
-            (aside / "plan").rename(folder)
-            raise
-    except OSError:
-        # Goes only when it is empty: an older plan that could not be put back stays there.
-        with suppress(OSError):
-            aside.rmdir()
-        raise
-    shutil.rmtree(aside, ignore_errors=True)
 
 
 def _read_bone(folder: Path, name: str, entry: dict[str, Any]) -> BoneModel:
@@ -289,11 +266,3 @@ def _surgical(content: dict[str, Any], folder: Path) -> SurgicalContent:
 
 def _points(rows: Any) -> FloatArray:
     return np.array(rows, dtype=np.float64).reshape(-1, 3)
-
-
-def _not_written(folder: Path, error: OSError) -> PlanError:
-    return PlanError(
-        f"plan folder {folder} cannot be written ({error.strerror})",
-        subject=str(folder),
-        remedy="choose a folder that you may write to, with space left",
-    )

@@ -4,10 +4,9 @@ import base64
 from html import escape
 from pathlib import Path
 
-import numpy as np
-
-from navapp.preop.plan_origin import PlanOrigin
-from navapp.values import Plan
+from navapp.preop.plan_facts import make_bone_rows, make_origin_rows
+from navapp.preop.plan_view import PlanView
+from navapp.preop.summary_slices import SLICES_STYLE, make_slices_section
 
 _STYLE = """
 body { font: 15px/1.45 system-ui, sans-serif; color: #1a202c; max-width: 70em; margin: 2em auto;
@@ -19,26 +18,28 @@ table { border-collapse: collapse; } td, th { padding: .2em .9em .2em 0; text-al
 img { max-width: 100%; } p.note { color: #4a5568; max-width: 52em; }
 """
 _LOOK = (
-    "Look at the orange line: it must follow the outer rim of the bright cortex all the way, stop "
-    "at the joint, and take in no part of another bone. Where it does not, give --seed, --region "
-    "or a ready segmentation (--labels)."
+    "Look at the coloured lines: each must follow the outer rim of the bright cortex all the way, "
+    "stop at the joint, and take in no part of another bone. Where it does not, give --seed, "
+    "--region or a ready segmentation (--labels)."
 )
 
 
-def make_summary_page(plan: Plan, origin: PlanOrigin, folder: Path) -> str:
-    """The page; pictures are those that lie in the folder already."""
+def make_summary_page(view: PlanView, folder: Path) -> str:
+    """The page, self-contained; pictures of the bones are those that lie in the folder already."""
+    plan, origin = view.plan, view.origin
     warnings = "".join(f'<p class="warning">{escape(text)}</p>' for text in origin.warnings)
     parts = [
         f"<h1>Plan {escape(plan.name or folder.name)}</h1>",
         "<p>Research software, not for clinical use. Coordinates are LPS, lengths mm.</p>",
         warnings or "<p>No warnings.</p>",
         "<h2>Where it comes from</h2>",
-        _table(_origin_rows(origin)),
+        _table(make_origin_rows(plan, origin)),
         "<h2>Bones</h2>",
-        _bones(plan, origin),
+        _bones(view),
     ]
     if origin.spacing_mm:
         parts.append(f'<p class="note">{_LOOK}</p>')
+    parts.append(make_slices_section(view))
     for name in plan.bones:
         picture = folder / f"preview_{name}.png"
         if picture.is_file():
@@ -49,47 +50,20 @@ def make_summary_page(plan: Plan, origin: PlanOrigin, folder: Path) -> str:
     title = escape(plan.name or folder.name)
     return (
         f'<!doctype html><html lang="en"><meta charset="utf-8"><title>Plan {title}</title>'
-        f"<style>{_STYLE}</style><body>{body}</body></html>\n"
+        f"<style>{_STYLE}{SLICES_STYLE}</style><body>{body}</body></html>\n"
     )
 
 
-def _origin_rows(origin: PlanOrigin) -> list[tuple[str, str]]:
-    rows: list[tuple[str, str]] = [("made from", origin.kind)]
-    if origin.description:
-        rows.append(("series", origin.description))
-    if origin.spacing_mm:
-        spacing = " x ".join(f"{step:.3g}" for step in origin.spacing_mm)
-        rows.append(("voxels", f"{' x '.join(map(str, origin.size))} of {spacing} mm"))
-    if origin.threshold_hu is not None:
-        rows.append(("looked at as bone", f"above {origin.threshold_hu:g} HU"))
-    if origin.cortex_hu is not None:
-        rows.append(("density of cortex", f"{origin.cortex_hu:.0f} HU, found in this CT"))
-    if origin.blur_mm:
-        plane, axial = origin.blur_mm
-        rows.append(
-            ("blur of the scanner", f"{plane:.2f} mm in the slices, {axial:.2f} mm across (sd)")
-        )
-    return rows
-
-
-def _bones(plan: Plan, origin: PlanOrigin) -> str:
-    head = "<tr><th>bone</th><th>side</th><th>volume</th><th>size</th><th>vertices</th>"
-    head += "<th>edge measured</th><th>moves a pose (sd)</th><th>cut end</th></tr>"
+def _bones(view: PlanView) -> str:
     rows = []
-    for name, bone in plan.bones.items():
-        share = origin.measured.get(name)
-        cells = (
-            name,
-            bone.side or "unknown",
-            f"{bone.mesh.volume_mm3() / 1000.0:.1f} cm3",
-            " x ".join(f"{extent:.0f}" for extent in bone.mesh.size_mm) + " mm",
-            str(len(bone.mesh.vertices_mm)),
-            "-" if share is None else f"{100.0 * share:.0f} %",
-            f"{bone.surface_sd_mm:.2f} mm" if bone.surface_sd_mm else "unknown",
-            "yes" if np.any(bone.is_removed) else "no",
-        )
+    heads: list[str] = []
+    for name, bone in view.plan.bones.items():
+        facts = make_bone_rows(bone, view.origin)
+        heads = [head for head, _ in facts]
+        cells = (name, *(value for _, value in facts))
         rows.append("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>")
-    return f"<table>{head}{''.join(rows)}</table>"
+    head = "".join(f"<th>{escape(text)}</th>" for text in ("bone", *heads))
+    return f"<table><tr>{head}</tr>{''.join(rows)}</table>"
 
 
 def _table(rows: list[tuple[str, str]]) -> str:

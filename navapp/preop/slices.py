@@ -1,73 +1,119 @@
-"""Draws slices of a volume with a surface's contour, to check a segmentation by eye."""
+"""Slices through a plan, in three directions of the patient, and the contours of surfaces in them.
+
+Slices lie across the axes of LPS, whatever way a CT was recorded: their marks and positions are
+then right by construction. They are seen as radiologists see them: the patient's right at the left
+of axial and coronal slices, the front at the left of sagittal ones.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray
-from navapp.preop.volume import CtVolume, LabelVolume
 
 Picture = NDArray[np.uint8]
 
-_HEIGHT_PX = 360
-# From fat to dense cortex.
-_BLACK_HU, _WHITE_HU = -200.0, 1400.0
-_CONTOUR = (60, 170, 255)
-_MARGIN_MM = 12.0
-# Subpixels of OpenCV's drawing, as a shift.
-_SHIFT = 4
+# What is shown around the bones.
+MARGIN_MM = 15.0
+_STEP_MM = 1.0
+# Larger regions get a longer step: a volume of so many voxels fills a few megabytes.
+_MOST_VOXELS = 8_000_000
+_STEPS_PER_MM = 4
 
 
-def draw_slices(volume: CtVolume | LabelVolume, mesh: TriangleMesh) -> Picture:
-    """(h, w, 3) BGR: the three slices through a surface's middle, its contour drawn in.
+@dataclass(frozen=True, slots=True)
+class Direction:
+    """One of three ways to slice. Axes are those of LPS: 0 to the left, 1 back, 2 to the head."""
+
+    name: str
+    axis: int  # that the slices lie across
+    across: int  # axis that points right in the picture
+    down: int  # axis that runs up or down in it
+    is_down: bool  # the axis points down in the picture
+    marks: tuple[str, str, str, str]  # left, right, top, bottom of the picture
+    towards: str  # where slices of a higher number lie
+
+    @property
+    def letter(self) -> str:
+        """Of the coordinate that is the slice's position."""
+        return "xyz"[self.axis]
+
+
+DIRECTIONS = (
+    Direction("axial", 2, 0, 1, True, ("R", "L", "A", "P"), "head"),
+    Direction("coronal", 1, 0, 2, False, ("R", "L", "H", "F"), "back"),
+    Direction("sagittal", 0, 1, 2, False, ("A", "P", "H", "F"), "left"),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class SliceGrid:
+    """A lattice of cubes along the axes of LPS; a slice is one layer of it."""
+
+    origin_mm: tuple[float, float, float]  # centre of the first cube
+    step_mm: float
+    size: tuple[int, int, int]  # cubes along x, y, z
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.origin_mm).all() and 0.0 < self.step_mm < np.inf):
+            raise ValueError("a grid has a finite place and a positive step")
+        if min(self.size) < 1:
+            raise ValueError("a grid has at least one cube")
+
+    def count_slices(self, direction: Direction) -> int:
+        """How many there are."""
+        return self.size[direction.axis]
+
+    def position_mm(self, direction: Direction, index: int) -> float:
+        """The coordinate that all points of a slice share."""
+        return self.origin_mm[direction.axis] + self.step_mm * index
+
+    def find_slices(self, direction: Direction, points_mm: FloatArray) -> NDArray[np.intp]:
+        """Index of the slice that each point is nearest to; may lie beyond the first or last."""
+        steps = (points_mm[:, direction.axis] - self.origin_mm[direction.axis]) / self.step_mm
+        # Half a step up: a point between two slices belongs to one of them, always the same.
+        nearest: NDArray[np.intp] = np.floor(steps + 0.5).astype(np.intp)
+        return nearest
+
+    def shape_of(self, direction: Direction) -> tuple[int, int]:
+        """Rows and columns of a slice."""
+        return self.size[direction.down], self.size[direction.across]
+
+    def find_pixels(self, direction: Direction, points_mm: FloatArray) -> FloatArray:
+        """(..., 2) column and row of points in a slice, the centre of the first pixel at 0, 0."""
+        origin = np.array(self.origin_mm)
+        steps = (points_mm - origin) / self.step_mm
+        column, row = steps[..., direction.across], steps[..., direction.down]
+        if not direction.is_down:
+            row = self.size[direction.down] - 1 - row
+        return np.stack([column, row], axis=-1)
+
+
+def make_grid(
+    meshes: Sequence[TriangleMesh], bounds_mm: FloatArray | None = None, step_mm: float = _STEP_MM
+) -> SliceGrid:
+    """The grid around surfaces; its slices lie at whole multiples of the step.
 
     Args:
-        volume: CT in HU, or labels.
-        mesh: LPS mm.
+        meshes: at least one, LPS mm.
+        bounds_mm: (2, 3) that it does not leave: what a CT covers.
+        step_mm: that it has, or longer in a region that is very large.
     """
-    indices = volume.indices_of(mesh.vertices_mm)
-    return np.hstack([_slice(volume, mesh, indices, axis) for axis in (2, 1, 0)])
-
-
-def _slice(
-    volume: CtVolume | LabelVolume, mesh: TriangleMesh, indices: FloatArray, axis: int
-) -> Picture:
-    """One slice across an index axis (0 for i), at the height of most of the surface."""
-    import cv2
-
-    position = float(np.median(indices[:, axis]))
-    across, down = (other for other in (0, 1, 2) if other != axis)
-    voxels = volume.hu if isinstance(volume, CtVolume) else volume.labels
-    plane = np.take(voxels, int(np.clip(round(position), 0, volume.size[axis] - 1)), axis=2 - axis)
-    grey = _grey(volume, plane)
-    margin = np.ceil(_MARGIN_MM / volume.spacing_mm[[across, down]])
-    lower = np.maximum(indices[:, [across, down]].min(axis=0) - margin, 0.0).astype(int)
-    size = np.array([volume.size[across], volume.size[down]])
-    upper = np.minimum(indices[:, [across, down]].max(axis=0) + margin, size - 1.0).astype(int) + 1
-    grey = grey[lower[1] : upper[1], lower[0] : upper[0]]
-    scale = _HEIGHT_PX / ((upper - lower) * volume.spacing_mm[[across, down]])[1]
-    steps = scale * volume.spacing_mm[[across, down]]
-    width = max(2, round((upper - lower)[0] * steps[0]))
-    picture = cv2.cvtColor(
-        cv2.resize(grey, (width, _HEIGHT_PX), interpolation=cv2.INTER_LINEAR), cv2.COLOR_GRAY2BGR
-    )
-    ends = cut_contour(indices, mesh.faces, axis, position)[..., [across, down]]
-    # A voxel's middle lies half a voxel inside its enlarged square.
-    pixels = np.rint(((ends - lower + 0.5) * steps - 0.5) * 2**_SHIFT).astype(np.int32)
-    cv2.polylines(picture, list(pixels), False, _CONTOUR, 1, cv2.LINE_AA, _SHIFT)
-    # Up is the head, or the front.
-    is_upright = volume.lps_from_index[2 if down == 2 else 1, down] * (-1 if down == 2 else 1) > 0
-    return np.ascontiguousarray(picture if is_upright else picture[::-1])
-
-
-def _grey(volume: CtVolume | LabelVolume, plane: NDArray[np.generic]) -> NDArray[np.uint8]:
-    values = plane.astype(np.float32)
-    if isinstance(volume, CtVolume):
-        share = (values - _BLACK_HU) / (_WHITE_HU - _BLACK_HU)
-    else:
-        share = values / max(float(volume.labels.max()), 1.0)
-    grey: NDArray[np.uint8] = (255.0 * np.clip(share, 0.0, 1.0)).astype(np.uint8)
-    return grey
+    points = np.concatenate([mesh.vertices_mm for mesh in meshes])
+    lower, upper = points.min(axis=0) - MARGIN_MM, points.max(axis=0) + MARGIN_MM
+    if bounds_mm is not None:
+        lower, upper = np.maximum(lower, bounds_mm[0]), np.minimum(upper, bounds_mm[1])
+    volume_mm3 = float(np.maximum(upper - lower, step_mm).prod())
+    least_mm = (volume_mm3 / _MOST_VOXELS) ** (1.0 / 3.0)
+    if least_mm > step_mm:
+        step_mm = float(np.ceil(_STEPS_PER_MM * least_mm) / _STEPS_PER_MM)
+    first = np.ceil(lower / step_mm)
+    x, y, z = (step_mm * first).tolist()
+    n_x, n_y, n_z = np.maximum(np.floor(upper / step_mm) - first + 1, 1).astype(int).tolist()
+    return SliceGrid((x, y, z), step_mm, (n_x, n_y, n_z))
 
 
 def cut_contour(

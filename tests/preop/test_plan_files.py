@@ -9,7 +9,16 @@ import pytest
 from navapp.errors import PlanError
 from navapp.geometry.directions import ViewCone
 from navapp.geometry.ply import read_ply
-from navapp.preop import PlanOrigin, plan_files, read_origin, read_plan, write_plan
+from navapp.preop import (
+    PlanOrigin,
+    plan_files,
+    read_origin,
+    read_plan,
+    read_plan_view,
+    write_plan,
+)
+from navapp.preop.slice_volume import SliceVolume
+from navapp.preop.slices import make_grid
 from navapp.values import BoneModel, Plan
 from tests.geometry.shapes import sphere
 
@@ -370,3 +379,59 @@ def test_usual_approaches_come_back_and_do_not_change_what_a_plan_is(tmp_path) -
     again = read_plan(tmp_path / "plan").approaches
     np.testing.assert_allclose(again["femur"].axis, cone.axis, atol=1e-15)
     assert again["femur"].half_angle_deg == 40.0
+
+
+def make_slices(plan):
+    grid = make_grid([bone.mesh for bone in plan.bones.values()])
+    grey = np.random.default_rng(4).integers(0, 255, grid.size[::-1], dtype=np.uint8)
+    return SliceVolume(grid, grey, (-200.0, 1400.0))
+
+
+def test_slices_come_back_and_do_not_change_what_a_plan_is(tmp_path) -> None:
+    """Recorded sessions name their plan by its digest: pictures for a person are not in it."""
+    plan, origin = make_plan(), PlanOrigin("CT", warnings=("the CT is thick",))
+    volume = make_slices(plan)
+    write_plan(tmp_path / "plan", plan, origin, volume=volume)
+    write_plan(tmp_path / "bare", plan, origin)
+    again = read_plan(tmp_path / "plan")
+    assert again.digest == read_plan(tmp_path / "bare").digest == plan.digest
+    view = read_plan_view(tmp_path / "plan", again)
+    assert view.origin == origin
+    assert view.grid == volume.grid
+    np.testing.assert_array_equal(view.volume.grey, volume.grey)
+
+
+def test_a_plan_without_slices_is_written_as_ever_and_shows_contours_alone(tmp_path) -> None:
+    plan = make_plan()
+    write_plan(tmp_path / "plan", plan)
+    assert set(json.loads((tmp_path / "plan" / "plan.json").read_text())) == {
+        "format", "space", "unit", "bones", "targets", "curves", "approaches", "content",
+        "origin", "hash", "file_hash",
+    }  # fmt: skip
+    view = read_plan_view(tmp_path / "plan", read_plan(tmp_path / "plan"))
+    assert not view.has_pictures
+    assert view.grid == make_grid([bone.mesh for bone in plan.bones.values()])
+
+
+@pytest.mark.parametrize("damage", ["gone", "cut", "another"])
+def test_damaged_slices_are_noticed(tmp_path, damage) -> None:
+    plan = make_plan()
+    write_plan(tmp_path / "plan", plan, volume=make_slices(plan))
+    path = tmp_path / "plan" / "slices.npz"
+    content = path.read_bytes()
+    path.unlink()
+    if damage == "cut":
+        path.write_bytes(content[:-100])
+    elif damage == "another":
+        write_plan(tmp_path / "other", plan, volume=make_slices(make_plan(31.0)))
+        path.write_bytes((tmp_path / "other" / "slices.npz").read_bytes())
+    with pytest.raises(PlanError, match=r"is damaged: slices.npz is missing or was changed"):
+        read_plan(tmp_path / "plan")
+
+
+def test_a_full_disk_at_the_slices_leaves_nothing(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(plan_files, "write_slices", no_space)
+    plan = make_plan()
+    with pytest.raises(PlanError, match="No space left"):
+        write_plan(tmp_path / "plan", plan, volume=make_slices(plan))
+    assert names(tmp_path) == []

@@ -6,6 +6,7 @@ import pytest
 
 from navapp.preop.plan_origin import PlanOrigin, origin_from_json, origin_to_json
 from navapp.preop.plan_summary import make_summary_page
+from navapp.preop.plan_view import make_plan_view
 from navapp.values import BoneModel, Plan
 from tests.geometry.shapes import sphere
 
@@ -33,7 +34,8 @@ def test_programs_are_told_of_no_volume_where_there_was_none() -> None:
 
 
 def test_the_page_says_what_is_needed_to_decide(tmp_path) -> None:
-    page = make_summary_page(Plan({"femur": BoneModel("femur", sphere(40.0, 20))}), CT, tmp_path)
+    plan = Plan({"femur": BoneModel("femur", sphere(40.0, 20))})
+    page = make_summary_page(make_plan_view(plan, CT), tmp_path)
     for words in (
         "Knee &lt;right&gt; 0.6", "400 x 300 x 200 of 0.5 x 0.5 x 0.8 mm", "above 200 HU",
         "1210 HU, found in this CT", "0.52 mm in the slices, 0.61 mm across",
