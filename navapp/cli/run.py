@@ -5,6 +5,7 @@ import os
 import tempfile
 import tomllib
 from contextlib import ExitStack
+from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from navapp.config import Configuration
     from navapp.control.frame_result import FrameResult
     from navapp.control.scripted_operator import ScriptStep
+    from navapp.ui.background import Background
 
 _EXAMPLE = """\
 examples:
@@ -73,6 +75,7 @@ def add_parser(subparsers: Any) -> None:
         "--allow-unaccepted", action="store_true", help="use a rig that was not accepted"
     )
     parser.add_argument("--json", metavar="FILE", help="result for programs (- is stdout)")
+    parser.set_defaults(guide=None)  # of `navapp tutorial`, beside the picture
 
 
 def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
@@ -236,6 +239,8 @@ def _run_screen(session: LiveSession, options: argparse.Namespace, diagnostics: 
             log_folder() / "navapp.log",
             pictures=session.configuration.ui.pictures,
             hints=_hints(session, options),
+            background=_background(session, options),
+            guide=options.guide,
         )
     if runner.error is not None:
         raise runner.error
@@ -243,6 +248,19 @@ def _run_screen(session: LiveSession, options: argparse.Namespace, diagnostics: 
     if folder is not None:
         diagnostics.say(f"recorded session: {folder}")
     return code
+
+
+def _background(session: LiveSession, options: argparse.Namespace) -> "Background":
+    from navapp.config import find_file
+    from navapp.ui.background import Background
+
+    source = find_file(options.config)
+    return Background(
+        session.configuration,
+        session.specification,
+        date.today(),
+        "" if source is None else str(source),
+    )
 
 
 def _hints(session: LiveSession, options: argparse.Namespace) -> list[str]:

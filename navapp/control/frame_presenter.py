@@ -7,6 +7,7 @@ from drivers.frames import StereoFrame
 from navapp.control.candidate_pictures import CandidatePictures
 from navapp.control.display_link import DisplayLink
 from navapp.control.eye_preview import EyePreview
+from navapp.control.interlocks import describe_slowness, is_too_slow
 from navapp.control.mirror_checking import MirrorChecking
 from navapp.control.pictures import Composer, Image, OperatorPicture
 from navapp.control.session import Session
@@ -47,11 +48,12 @@ class FramePresenter:
         self._mirror_checking, self._eye, self._depth_marks = mirror_checking, eye, depth_marks
         self._valid_ms = valid_ms
         self._candidate_pictures = CandidatePictures(composer)
-        self._is_late = False
+        self._is_late = self._is_told_slow = False
 
     def show(self, frame: StereoFrame, snapshot: Snapshot) -> tuple[OverlayPicture, float]:
         """Compose, show until it expires, keep it for the screen; also how long composing took."""
         started_ns = time.perf_counter_ns()
+        self._is_told_slow &= is_too_slow(snapshot)
         mark = "SIMULATED" if snapshot.is_simulated else ""
         tracked = self._session.tracked
         foreground = None if tracked is None else tracked.foreground
@@ -133,6 +135,12 @@ class FramePresenter:
     def _tell_withdrawn(self, snapshot: Snapshot) -> None:
         """Guides went out between two frames; what commands do is told by the commands."""
         reasons = snapshot.reasons
+        if reasons[:1] == (Reason.TOO_SLOW,):
+            if not self._is_told_slow:
+                text = f"no guides: {describe_slowness(snapshot)}"
+                self._session.add_event("display", text, EventLevel.WARNING)
+            self._is_told_slow = True
+            return
         # What came too late was never seen.
         if (
             not self._is_late

@@ -1,11 +1,13 @@
 """Whether guides may be shown: one answer for display, overlay, log and screen."""
 
 from dataclasses import replace
+from statistics import median
 
 from navapp.control.mirror_error import MirrorError
 from navapp.control.states import (
     LimbLine,
     OtherBone,
+    Rates,
     SessionState,
     Snapshot,
     ToolLine,
@@ -14,6 +16,8 @@ from navapp.values import Reason, Status
 
 # A pose older than this shows where the bone was, not where it is, whatever is configured.
 MAX_POSE_AGE_MS = 500.0
+# Latencies of which the median tells whether a computer is too slow.
+_FEWEST_LATENCIES = 10
 
 
 def judge(draft: Snapshot) -> Snapshot:
@@ -112,10 +116,36 @@ def _of_pose(snapshot: Snapshot) -> list[Reason]:
     if verdict.status is not Status.OK:
         reasons += verdict.reasons or (Reason.BONE_LOST,)
     if snapshot.pose_age_ms is None or snapshot.pose_age_ms > _longest_ms(snapshot):
-        reasons.append(Reason.POSE_TOO_OLD)
+        reasons.append(Reason.TOO_SLOW if is_too_slow(snapshot) else Reason.POSE_TOO_OLD)
     if snapshot.has_mirror and snapshot.pose_at_light is None:
         reasons.append(Reason.MOVES_TOO_FAST)
     return reasons
+
+
+def is_too_slow(snapshot: Snapshot) -> bool:
+    """Whether poses are too old before the next one comes, picture after picture."""
+    rates = snapshot.rates
+    if rates.frames_per_s is None or len(rates.latency_history_ms) < _FEWEST_LATENCIES:
+        return False
+    return _latency_ms(rates) + 1e3 / rates.frames_per_s > _longest_ms(snapshot)
+
+
+def describe_slowness(snapshot: Snapshot) -> str:
+    """How many pictures a second there are, and how many guides would need; of a slow computer."""
+    rates = snapshot.rates
+    if rates.frames_per_s is None or not rates.latency_history_ms:
+        return Reason.TOO_SLOW.value
+    longest_ms = _longest_ms(snapshot)
+    # A picture is handled for as long as the next one is waited for.
+    needed = 2e3 / longest_ms
+    return (
+        f"this computer makes {rates.frames_per_s:.1f} pictures a second, {_latency_ms(rates):.0f} "
+        f"ms late; guides need {needed:.0f}, and none may be older than {longest_ms:.0f} ms"
+    )
+
+
+def _latency_ms(rates: Rates) -> float:
+    return median(rates.latency_history_ms[-_FEWEST_LATENCIES:])
 
 
 def _longest_ms(snapshot: Snapshot) -> float:

@@ -116,6 +116,7 @@ class SnapshotMaker:
             cross_check=self.mirror_checking.state,
             is_camera_silent=self.camera.is_silent,
             rig_alarm="" if session.rig_error is None else session.rig_error.problem,
+            rows=None if tracked is None else tracked.rows,
             length_check=self.rig_watch.length_check,
             is_over=session.is_over,
         )

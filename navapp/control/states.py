@@ -17,7 +17,7 @@ from navapp.resection import Thickness
 from navapp.tools.patient_check import CheckAnswer, CheckResult
 from navapp.tools.tool import SeenTool, ToolKind
 from navapp.tools.tool_on_bone import HoleOffset, ToolOnBone
-from navapp.values import Measured, Reason, StageSpec, StepKind, Verdict
+from navapp.values import Measured, Reason, RowCheck, StageSpec, StepKind, Verdict
 
 
 class SessionState(Enum):
@@ -277,6 +277,7 @@ class Snapshot:
     # no picture has come for longer than the camera's period explains.
     is_camera_silent: bool = False
     rig_alarm: str = ""  # why the rig is not believed any more; empty while it is
+    rows: RowCheck | None = None  # of the newest pair, as far as the bone tells; None: nothing
     # the newest look at a known length that says something of the rig, else the newest; None before
     # one.
     length_check: LengthCheck | None = None

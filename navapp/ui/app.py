@@ -38,6 +38,8 @@ from navapp.ui.actions import (
     bindings,
     is_possible,
 )
+from navapp.ui.background import Background
+from navapp.ui.calibration_page import CalibrationPage
 from navapp.ui.gates_page import REASONS, GatesPage, condition_of_key
 from navapp.ui.help_page import HelpPage
 from navapp.ui.layers_page import LayersPage
@@ -50,6 +52,7 @@ from navapp.ui.pictures.picture_view import PictureView
 from navapp.ui.quiet_app import QuietApp
 from navapp.ui.screens import ViewScreen
 from navapp.ui.session import Session
+from navapp.ui.settings_page import SettingsPage
 from navapp.ui.start_page import StartChosen, StartPage
 from navapp.ui.steps_page import StepsPage, step_of_key
 from navapp.ui.symbols import UNICODE, Symbols
@@ -77,6 +80,8 @@ _PAGES = {
     "events": EventsPage,
 }
 
+_BACKGROUND_PAGES = {"calibration": CalibrationPage, "settings": SettingsPage}
+
 
 class NavigationApp(QuietApp):
     """The operator's screen for one session.
@@ -88,6 +93,7 @@ class NavigationApp(QuietApp):
         polls_per_s: how often the newest snapshot is taken; 0 means only when `poll` is called.
         graphics: that the terminal draws; None: half blocks.
         hints: told when it starts.
+        background: settings and calibrations; None: their pages say that they are not known.
     """
 
     CSS_PATH = Path(__file__).with_name("navapp.tcss")
@@ -106,6 +112,7 @@ class NavigationApp(QuietApp):
         polls_per_s: int = POLLS_PER_S,
         graphics: Graphics | None = None,
         hints: Sequence[str] = (),
+        background: Background | None = None,
     ) -> None:
         super().__init__()
         if graphics is not None:
@@ -117,6 +124,7 @@ class NavigationApp(QuietApp):
         self._symbols = symbols
         self._polls_per_s = polls_per_s
         self._hints = tuple(hints)
+        self._background = background
         self._n_polls = 0
         self._n_unchanged = 0
         snapshot = session.snapshot()
@@ -179,12 +187,21 @@ class NavigationApp(QuietApp):
             self.push_screen(PicksPage(view, self._picks))
         elif name == "near":
             self._toggle_near()
+        elif name in _BACKGROUND_PAGES:
+            self._open_background(name)
         elif name in _PAGES:
             self.push_screen(_PAGES[name](view))
         elif view.is_silent and not is_possible(action, view.snapshot, is_silent=True):
             self._say_silent(action.label)
         elif action.command is not None:
             self._session.submit(action.command(view.snapshot))
+
+    def _open_background(self, name: str) -> None:
+        """What the session stands on."""
+        if self._background is None:
+            self.notify(f"the {name} of this session is not known here", severity="warning")
+        else:
+            self.push_screen(_BACKGROUND_PAGES[name](self._view, self._background))
 
     def _toggle_near(self) -> None:
         """The region around the bone, or the whole picture."""

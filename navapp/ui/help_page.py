@@ -48,6 +48,10 @@ class KeyTable(TextView):
         lines.append(Content.assemble((f" {'ctrl+p':>7}  ", "bold $primary"), "find a command"))
         return [*lines, Content(""), Content.styled(f" {view.title}: {NOTICE}", "$text-muted")]
 
+    def get_content_height(self, container: Size, viewport: Size, width: int) -> int:
+        """As many lines as there are."""
+        return 1 if self._view is None else len(self.build(self._view, width, 0))
+
 
 class WordTable(TextView):
     """What the words on the screen mean."""

@@ -5,7 +5,7 @@ import textwrap
 from textual.content import Content
 
 from navapp.control.commands import Accept
-from navapp.control.interlocks import is_current
+from navapp.control.interlocks import is_current, is_too_slow
 from navapp.control.rules import why_refused
 from navapp.control.states import OtherBone, Snapshot
 from navapp.ui.gauges import Number, draw_bar
@@ -149,6 +149,9 @@ def _candidate(view: View, width: int) -> list[Content]:
     lines = [Content.styled(f"{level.mark(view.symbols)} judged {status.value}", level.value)]
     figures = [_figure("seen", Number.WHOLE, _compute_seen_percent(snapshot), "%"), *_fit(snapshot)]
     accept = ("a", "bold $foreground"), " accept   "
+    if is_too_slow(snapshot):
+        slow = textwrap.wrap("too slow to draw it in time", width)
+        lines += [Content.styled(line, Level.BAD.value) for line in slow]
     others = [Content("arrows: compare")] if len(snapshot.candidates) > 1 else []
     asks = [
         *others,

@@ -11,6 +11,7 @@ from pathlib import Path
 from navapp.control.states import DeviceHealth, EventLevel, SessionState, Snapshot
 from navapp.errors import DeviceError, NavappError, RigError
 from navapp.ui.app import NavigationApp
+from navapp.ui.background import Background
 from navapp.ui.pictures.graphics import Graphics, Wish, find_graphics
 from navapp.ui.quiet_app import drive, say
 from navapp.ui.session import Session
@@ -29,6 +30,7 @@ def run_screen(
     pictures: Wish = "blocks",
     hints: Sequence[str] = (),
     guide: Guide[Snapshot] | None = None,
+    background: Background | None = None,
 ) -> int:
     """Run the screen until it ends, then stop the session, whatever happened.
 
@@ -39,6 +41,7 @@ def run_screen(
         pictures: how the terminal gets them.
         hints: told when it starts.
         guide: of the tutorial, shown above the picture.
+        background: settings and calibrations, for the pages that show them.
 
     Returns:
         Exit code; 128 and the number of the signal that ended it. After a failure one sentence is
@@ -54,7 +57,14 @@ def run_screen(
                 graphics = Graphics(words=graphics.words)
             told = (*hints, *(() if graphics.has_pixels else (f"pictures are {graphics.words}",)))
             make_app = NavigationApp if guide is None else partial(TutorialApp, guide)
-            app = make_app(session, title, symbols=symbols, graphics=graphics, hints=told)
+            app = make_app(
+                session,
+                title,
+                symbols=symbols,
+                graphics=graphics,
+                hints=told,
+                background=background,
+            )
             code = asyncio.run(drive(app))
             failure = app.failure
             if failure is not None:

@@ -6,6 +6,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
+from navapp.control.interlocks import describe_slowness
 from navapp.control.states import (
     DeviceHealth,
     EventLevel,
@@ -143,6 +144,8 @@ class View:
         if not self.snapshot.reasons:
             return "", ""
         first = self.snapshot.reasons[0]
+        if first is Reason.TOO_SLOW:
+            return describe_slowness(self.snapshot), first.remedy
         is_waiting = first is Reason.NOT_NAVIGATING and self.snapshot.state in _WAITING
         return first.value, _WAITING[self.snapshot.state] if is_waiting else first.remedy
 

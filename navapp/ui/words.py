@@ -53,5 +53,6 @@ WORDS: tuple[tuple[str, str], ...] = (
         "check on the patient",
         "u: what touched places say: passed, failed, more points, cannot tell",
     ),
+    ("known length", "h: of a board in view, as this rig measures it; it shows a moved camera"),
     ("measured here", "cuts, holes and parts of this stage that are made, against the plan"),
 )

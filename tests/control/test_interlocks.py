@@ -2,10 +2,16 @@ from dataclasses import replace
 
 import pytest
 
-from navapp.control.interlocks import MAX_POSE_AGE_MS, check_interlocks, is_current
+from navapp.control.interlocks import (
+    MAX_POSE_AGE_MS,
+    check_interlocks,
+    describe_slowness,
+    is_current,
+)
 from navapp.control.stages import STAGES
 from navapp.control.states import (
     OtherBone,
+    Rates,
     SessionState,
     Snapshot,
 )
@@ -94,3 +100,34 @@ def test_other_bones_neither_make_navigable_nor_prevent_it() -> None:
     assert check_interlocks(replace(GOOD, others=lost)) == ()
     well = (OtherBone("tibia", Verdict(Status.OK, 0.1), 1.0),)
     assert check_interlocks(replace(GOOD, others=well, left_from_bone=None)) == (Reason.BONE_LOST,)
+
+
+SLOW = Rates(frames_per_s=2.9, latency_history_ms=(340.0,) * 12)
+
+
+def test_a_computer_that_is_too_slow_is_told_with_figures() -> None:
+    slow = replace(GOOD, pose_age_ms=MAX_POSE_AGE_MS + 1.0, rates=SLOW)
+    assert check_interlocks(slow) == (Reason.TOO_SLOW,)
+    assert describe_slowness(slow) == (
+        "this computer makes 2.9 pictures a second, 340 ms late; guides need 4, and none may be "
+        "older than 500 ms"
+    )
+
+
+@pytest.mark.parametrize(
+    "rates",
+    [
+        Rates(),
+        Rates(frames_per_s=2.9),
+        replace(SLOW, latency_history_ms=SLOW.latency_history_ms[:9]),
+        # One picture took long; the others did not.
+        Rates(frames_per_s=12.0, latency_history_ms=(60.0,) * 11 + (900.0,)),
+    ],
+)
+def test_a_pose_that_is_too_old_once_says_nothing_of_the_computer(rates: Rates) -> None:
+    old = replace(GOOD, pose_age_ms=MAX_POSE_AGE_MS + 1.0, rates=rates)
+    assert check_interlocks(old) == (Reason.POSE_TOO_OLD,)
+
+
+def test_a_slow_computer_may_show_guides_while_the_pose_is_young() -> None:
+    assert check_interlocks(replace(GOOD, rates=SLOW)) == ()

@@ -5,7 +5,7 @@ import pytest
 
 from navapp.control.commands import Blank, Register
 from navapp.control.interlocks import grow_older
-from navapp.control.states import Event, Snapshot
+from navapp.control.states import Event, Rates, Snapshot
 from navapp.values import Reason
 from sim_devices.display import SimulatedDisplay
 from tests.control.fakes import CLEAR, Bench, navigating
@@ -132,3 +132,33 @@ def test_an_older_look_changes_nothing_but_ages() -> None:
     # A clock that stands before the snapshot's time makes nothing younger.
     before = grow_older(snapshot, snapshot.time_ns - 50 * MS)
     assert before.pose_age_ms == snapshot.pose_age_ms
+
+
+class SlowMeter:
+    """Counts as a computer that makes three pictures a second."""
+
+    is_slow = True
+
+    def add(self, latency_ms: float | None, skew_ns: int) -> None:
+        pass
+
+    def rates(self, n_dropped: int) -> Rates:
+        latency_ms = 340.0 if self.is_slow else 20.0
+        fps = 2.9 if self.is_slow else 30.0
+        return Rates(fps, latency_ms, (fps,), (latency_ms,) * 12)
+
+
+def test_a_slow_computer_is_told_once_and_again_when_it_has_been_fast_meanwhile() -> None:
+    bench = navigating(Bench())
+    meter = SlowMeter()
+    bench.controller._session._meter = meter
+    for is_slow in (True, True, False, True):
+        meter.is_slow = is_slow
+        bench.frames(2)
+        bench.clock.advance_ns(600 * MS)
+        bench.camera.is_silent = True
+        bench.frames()
+        bench.camera.is_silent = False
+    slow = [text for text in told(bench) if text.startswith("no guides: this computer makes 2.9")]
+    assert len(slow) == 2
+    assert bench.controller.snapshot_now().reasons == (Reason.TOO_SLOW,)
