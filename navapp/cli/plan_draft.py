@@ -37,7 +37,7 @@ def make_draft(options: argparse.Namespace, diagnostics: Diagnostics) -> "Draft"
         return _from_ct(options, diagnostics)
     if options.labels is not None:
         return _from_labels(options)
-    return _from_surfaces(options)
+    return _from_built_in(options) if options.built_in else _from_surfaces(options)
 
 
 def with_cartilage(draft: "Draft", entries: list[str]) -> "Draft":
@@ -162,6 +162,25 @@ def _from_labels(options: argparse.Namespace) -> "Draft":
             "--labels needs to know which value is which bone", remedy="add --label femur=VALUE"
         )
     return make_draft_from_labels(read_labels(options.labels), values, options.side)
+
+
+def _from_built_in(options: argparse.Namespace) -> "Draft":
+    """The knee that `navapp run` simulates with the same configuration."""
+    from navapp.config import find_file, load
+    from navapp.devices.simulated_room import make_simulated_bones
+    from navapp.preop import PlanOrigin
+    from navapp.preop.plan_drafts import Draft
+    from navapp.values import BoneModel
+
+    simulated = load(find_file(options.config)).camera.simulated
+    if options.side not in (None, simulated.side):
+        raise UsageError(
+            f"the built-in knee is a {simulated.side} one",
+            remedy="leave --side out, or set [camera.simulated] side",
+        )
+    meshes = make_simulated_bones(simulated)
+    bones = {name: BoneModel(name, mesh, simulated.side) for name, mesh in meshes.items()}
+    return Draft(bones, PlanOrigin(), side=simulated.side)
 
 
 def _from_surfaces(options: argparse.Namespace) -> "Draft":

@@ -93,6 +93,11 @@ def scenario_of(settings: SimulationSection) -> Scenario:
     )
 
 
+def make_simulated_bones(settings: SimulationSection) -> dict[str, TriangleMesh]:
+    """Name -> surface as planned, of the knee that lies in the room."""
+    return dict(World(scenario_of(settings)).anatomy.bones)
+
+
 def _fault(section: FaultSection) -> Fault:
     kind = FaultKind(section.kind)
     return Fault(kind, section.start_s, section.duration_s, section.delay_s, section.turn_deg)
