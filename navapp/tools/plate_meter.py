@@ -210,7 +210,9 @@ class PlateMeter:
         n_good = np.bincount(marker[inside & is_good], minlength=self._n_markers)
         if not (n_good >= _SEEN_INSIDE * np.maximum(n_inside, 1)).any():
             return "no marker is seen whole"
-        if is_good[inside].mean() < _INSIDE_SHARE * is_good[~inside].mean():
+        # Of a plate that is mostly covered, perhaps no border is in sight.
+        around = is_good[~inside]
+        if len(around) and is_good[inside].mean() < _INSIDE_SHARE * around.mean():
             return "another plate's markers"
         return share
 

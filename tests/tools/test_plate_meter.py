@@ -1,6 +1,7 @@
 """Plates in simulated pictures: measured where they are, and refused where they are not seen."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -178,3 +179,10 @@ def test_markers_that_are_there_twice_are_nobodys(meter: PlateMeter, facing: Pic
         shown[: part.shape[0], -part.shape[1] :] = part
         doubled.append(shown)
     assert isinstance(meter.measure((doubled[0], doubled[1])), str)
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_plate_of_which_no_border_is_in_sight_is_judged_by_its_insides(meter: PlateMeter) -> None:
+    inside = np.flatnonzero(~meter._edges.is_border)
+    located = SimpleNamespace(kept=inside, shown=inside)
+    assert meter._judge_eye(located, np.ones(len(inside), dtype=bool)) == 1.0
