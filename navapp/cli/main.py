@@ -26,6 +26,7 @@ _VERBS = (
     "devices",
     "doctor",
     "config",
+    "completion",
 )
 
 
