@@ -5,6 +5,7 @@ import json
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from navapp.control.capture.states import CaptureSnapshot, Outcome
     from navapp.devices import OpenedCapture
     from navapp.geometry.rig import StereoRig
+    from navapp.ui.tutorial.guide import Guide
 
 _EXAMPLE = """\
 examples:
@@ -58,6 +60,7 @@ def add_parser(subparsers: Any) -> None:
         help="enough with N pairs (default: [calibration] stop_capture_mm decides)",
     )
     parser.add_argument("--json", metavar="FILE", help="result for programs (- is stdout)")
+    parser.set_defaults(guide=None)  # of `navapp tutorial`, beside the pictures
 
 
 def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
@@ -88,7 +91,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
         undo.callback(capture.close)
         if options.headless:
             _headless(capture, diagnostics)
-        elif (code := _on_screen(capture)) != 0:
+        elif (code := _on_screen(capture, options.guide)) != 0:
             return code
         last = capture.snapshot
     return _finish(last, solver, options, diagnostics)
@@ -181,12 +184,17 @@ def _headless(capture: "Capture", diagnostics: Diagnostics) -> None:
         snapshot = capture.step()
 
 
-def _on_screen(capture: "Capture") -> int:
+def _on_screen(capture: "Capture", guide: "Guide[CaptureSnapshot] | None") -> int:
     """The operator does it; 0, or the code of what ended the screen."""
     from navapp.cli.guided_screen import run_on_screen
     from navapp.ui.capture.app import run_capture_app
 
-    return run_on_screen(capture, "capture", run_capture_app)
+    if guide is None:
+        return run_on_screen(capture, "capture", run_capture_app)
+    from navapp.ui.tutorial.apps import TutorialCaptureApp
+
+    make_app = partial(TutorialCaptureApp, guide)
+    return run_on_screen(capture, "capture", partial(run_capture_app, make_app=make_app))
 
 
 def _finish(

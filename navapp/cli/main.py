@@ -15,6 +15,7 @@ from navapp.errors import NavappError
 # Verb -> module with `add_parser(subparsers)` and `run(arguments, diagnostics) -> int`.
 _VERBS = (
     "run",
+    "tutorial",
     "replay",
     "plan",
     "prior",
@@ -64,6 +65,20 @@ def run(arguments: Sequence[str]) -> int:
         return 1
 
 
+def call(arguments: Sequence[str], diagnostics: Diagnostics, **more: object) -> int:
+    """Do a verb from within another one; its errors are raised.
+
+    Args:
+        arguments: as on the command line.
+        diagnostics: of the verb that asks.
+        more: what no option says.
+    """
+    options = _parser().parse_args(arguments)
+    for name, value in more.items():
+        setattr(options, name, value)
+    return int(_module_of(options.verb).run(options, diagnostics))
+
+
 class _Parser(argparse.ArgumentParser):
     """Says which of its words may have been meant."""
 
@@ -86,7 +101,8 @@ def _parser() -> argparse.ArgumentParser:
         prog="navapp",
         description="Markerless navigation for knee replacement. Research software, not for "
         "clinical use.",
-        epilog="example: navapp run        (the application on the simulated rig)",
+        epilog="example: navapp run        (the application on the simulated rig); new here: "
+        "navapp tutorial",
     )
     parser.add_argument("--config", metavar="FILE", help="configuration file (TOML)")
     parser.add_argument("--verbose", action="store_true", help="say more: a line a frame")

@@ -7,6 +7,7 @@ from navapp.devices.mirror_alignment import OpenedAlignment, open_mirror_alignme
 from navapp.devices.peripherals import read_display_name, read_projector
 from navapp.devices.session_devices import OpenedDevices, open_live, open_recording
 from navapp.devices.simulated_mirror import make_practice_display
+from navapp.devices.simulated_patient import SimulatedPatient, make_simulated_patient
 from navapp.devices.simulated_room import Simulation
 
 __all__ = [
@@ -14,9 +15,11 @@ __all__ = [
     "OpenedCapture",
     "OpenedDevices",
     "OpenedLatency",
+    "SimulatedPatient",
     "Simulation",
     "make_practice_display",
     "make_real_camera",
+    "make_simulated_patient",
     "open_capture",
     "open_latency",
     "open_live",
