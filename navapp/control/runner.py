@@ -2,11 +2,13 @@
 
 import threading
 from collections.abc import Callable
+from dataclasses import replace
 
 from navapp.control.commands import Command
 from navapp.control.controller import SessionController
 from navapp.control.operators import Operator
-from navapp.control.states import SessionState, Snapshot
+from navapp.control.states import Progress, SessionState, Snapshot
+from navapp.geometry.compilation import Compilation, watch_compilation
 
 _PATIENCE_NS = 10_000_000_000
 
@@ -44,6 +46,7 @@ class SessionRunner:
     def __init__(self, controller: SessionController) -> None:
         self._controller = controller
         self._stopping = threading.Event()
+        self._compilation = Compilation()
         self._thread = threading.Thread(target=self._run, name="pipeline", daemon=True)
         self.error: Exception | None = None
 
@@ -53,7 +56,11 @@ class SessionRunner:
 
     def snapshot(self) -> Snapshot:
         """The newest one, judged at this moment: also while a step hangs."""
-        return self._controller.snapshot_now()
+        snapshot = self._controller.snapshot_now()
+        if not self._compilation.is_running:
+            return snapshot
+        what = f"compiling kernels, once on a machine: {self._compilation.count} so far"
+        return replace(snapshot, progress=Progress(what, None))
 
     def submit(self, command: Command) -> None:
         """Hand a command over."""
@@ -71,8 +78,9 @@ class SessionRunner:
 
     def _run(self) -> None:
         try:
-            while not self._stopping.is_set() and not self._controller.snapshot.is_over:
-                self._controller.step()
+            with watch_compilation() as self._compilation:
+                while not self._stopping.is_set() and not self._controller.snapshot.is_over:
+                    self._controller.step()
         except Exception as error:  # noqa: BLE001 (kept for the caller; the display must go dark)
             self.error = error
         finally:

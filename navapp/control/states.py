@@ -103,7 +103,7 @@ class Progress:
     """Long work that is running."""
 
     what: str
-    share: float
+    share: float | None  # that is done; None: not known
 
 
 @dataclass(frozen=True, slots=True)

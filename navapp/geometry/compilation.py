@@ -13,6 +13,7 @@ class Compilation:
 
     def __init__(self) -> None:
         self._count = 0
+        self._n_running = 0
         self._lock = threading.Lock()
 
     @property
@@ -20,11 +21,22 @@ class Compilation:
         """So many were begun."""
         return self._count
 
-    def add(self) -> int:
+    @property
+    def is_running(self) -> bool:
+        """One is being compiled at this moment."""
+        return self._n_running > 0
+
+    def begin(self) -> int:
         """One more is compiled; answers with the count."""
         with self._lock:
             self._count += 1
+            self._n_running += 1
             return self._count
+
+    def end(self) -> None:
+        """One is done."""
+        with self._lock:
+            self._n_running -= 1
 
 
 @contextmanager
@@ -42,10 +54,10 @@ def watch_compilation(
 
     class Listener(event.Listener):  # type: ignore[misc]
         def on_start(self, event: event.Event) -> None:
-            on_kernel(compilation.add(), event.data["dispatcher"].py_func.__name__)
+            on_kernel(compilation.begin(), event.data["dispatcher"].py_func.__name__)
 
         def on_end(self, event: event.Event) -> None:
-            """What counts is the beginning."""
+            compilation.end()
 
     listener = Listener()
     event.register("numba:compile", listener)

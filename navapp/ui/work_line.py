@@ -26,6 +26,8 @@ class WorkLine(TextView):
             return [Content.styled(cut(text, width, view.symbols), Level.BAD.value)]
         if progress is None:
             return [Content("")]
+        if progress.share is None:
+            return [Content(f" {cut(progress.what, width - 1, view.symbols)}")]
         is_cancellable = view.snapshot.state is SessionState.REGISTERING
         hint = "  c cancel" if is_cancellable else ""
         room = max(width - _BAR_WIDTH - len(hint) - 9, 0)

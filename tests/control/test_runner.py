@@ -1,4 +1,9 @@
 import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import numba
+from numba.core import event
 
 from navapp.control.commands import (
     Accept,
@@ -83,3 +88,41 @@ def test_stopping_a_runner_darkens_the_display_before_it_waits(monkeypatch) -> N
     monkeypatch.setattr(bench.controller, "close", lambda: order.append("closed"))
     runner.stop()
     assert order == ["dark", "closed"]
+
+
+def test_a_kernel_that_is_compiled_is_told_while_the_step_hangs() -> None:
+    bench = Bench()
+    runner = SessionRunner(bench.controller)
+    runner.start()
+    wait_for(lambda: runner.snapshot().state.value == "ready", "readiness")
+    assert runner.snapshot().progress is None
+    started, done = threading.Event(), threading.Event()
+
+    def compile_slowly() -> None:
+        started.set()
+        done.wait(10.0)
+
+    with told_compilation(compile_slowly):
+        started.wait(10.0)
+        progress = runner.snapshot().progress
+        done.set()
+    assert progress is not None
+    assert progress.what == "compiling kernels, once on a machine: 1 so far"
+    assert progress.share is None
+    assert runner.snapshot().progress is None
+    runner.stop()
+
+
+@contextmanager
+def told_compilation(work: Callable[[], None]) -> Iterator[None]:
+    """A thread that does some work as numba does while it compiles."""
+    kernel = numba.njit(lambda number: number)
+
+    def run() -> None:
+        with event.trigger_event("numba:compile", data={"dispatcher": kernel}):
+            work()
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    yield
+    thread.join()

@@ -14,9 +14,12 @@ def make_kernel():
 
 def test_a_kernel_is_told_when_it_is_compiled_and_not_again():
     kernel, told = make_kernel(), []
-    with watch_compilation(lambda count, name: told.append((count, name))) as compilation:
+    with watch_compilation(
+        lambda count, name: told.append((count, name, compilation.is_running))
+    ) as compilation:
         assert kernel(2) == 4
-    assert told == [(1, "doubled_length")]
+        assert not compilation.is_running
+    assert told == [(1, "doubled_length", True)]
     assert compilation.count == 1
     with watch_compilation() as compilation:
         assert kernel(3) == 6

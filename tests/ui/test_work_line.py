@@ -1,0 +1,14 @@
+"""The line of long work, with and without a known end."""
+
+from navapp.control.states import Progress
+from navapp.ui.work_line import WorkLine
+from tests.ui import snapshots
+from tests.ui.test_panels import lines_of, view_of
+
+
+def test_work_whose_end_is_not_known_has_no_bar():
+    (known,) = lines_of(WorkLine(), view_of(snapshots.starting()), 100, 1)
+    assert "42 %" in known
+    progress = Progress("compiling kernels: 57 so far", None)
+    (line,) = lines_of(WorkLine(), view_of(snapshots.starting(progress=progress)), 100, 1)
+    assert line.strip() == "compiling kernels: 57 so far"
