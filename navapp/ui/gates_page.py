@@ -123,7 +123,7 @@ class GatesPage(PageScreen):
 
     page_title, keys = (
         "time-out and gates",
-        " back  a letter: confirmed  its capital: not after all  ENTER enter the stage",
+        " back  letter: confirmed  capital: not so  ENTER enter it",
     )
 
     def compose_page(self) -> ComposeResult:

@@ -83,7 +83,7 @@ class HelpPage(PageScreen):
         Binding("question_mark", "dismiss", "back", show=False)
     ]
 
-    page_title, keys = "help", " back  arrows, PgDn: the overlay's colours, the words on the screen"
+    page_title, keys = "help", " back  arrows, PgDn: the overlay's colours, the words"
     container = VerticalScroll
 
     def compose_page(self) -> ComposeResult:

@@ -170,7 +170,7 @@ class PicksPage(PageScreen):
     ]
 
     page_title = "where are the landmarks?"
-    keys = " back  click, SHIFT arrows, arrows  ENTER pick  n next  x forget  g search  k check"
+    keys = " back  arrows  ENTER pick  n next  x forget  g search  k check"
 
     def __init__(self, view: View, picks: dict[str, Place]) -> None:
         super().__init__(view)

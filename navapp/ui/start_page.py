@@ -178,7 +178,7 @@ class StartPage(PageScreen):
     ]
 
     page_title = "where is the bone?"
-    keys = " back  ENTER search in the box  x search as the session began"
+    keys = " back  ENTER search in it  x search as the session began"
 
     def __init__(self, view: View, box: Box | None = None) -> None:
         super().__init__(view)

@@ -134,7 +134,7 @@ class StepsPage(PageScreen):
 
     page_title, keys = (
         "steps of the stage",
-        " back  a letter: that one has been made  its capital: not made after all",
+        " back  a letter: it is made  its capital: not made after all",
     )
 
     def compose_page(self) -> ComposeResult:

@@ -169,7 +169,7 @@ class ToolsPage(PageScreen):
 
     page_title, keys = (
         "tools, and the check on the patient",
-        " back  ENTER take a point  a letter: on that landmark  x forget the last  n begin anew",
+        " back  ENTER point  letter: a landmark  x drop the last  n anew",
     )
 
     def show(self, view: View, *, is_text_due: bool) -> None:

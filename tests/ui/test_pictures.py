@@ -9,12 +9,17 @@ import pytest
 from textual.content import Content
 from textual.pilot import Pilot
 
+from navapp.control.stages import STAGES
 from navapp.control.states import Snapshot
 from navapp.ui.app import NavigationApp
+from navapp.ui.page_keys import PageKeys
 from navapp.ui.pictures.picture_view import PictureView
 from navapp.ui.pose_panel import PosePanel
 from navapp.ui.symbols import ASCII
 from tests.ui import snapshots
+from tests.ui.test_app import BellCounter, play
+from tests.ui.test_steps_page import STEPS
+from tests.ui.test_tools_page import a_snapshot as with_tools
 
 STATES: dict[str, tuple[Callable[[], Snapshot], str, str]] = {
     "navigating": (snapshots.navigating, "NAVIGABLE  yes", "left view"),
@@ -77,15 +82,41 @@ def test_plain_terminal(snap_compare: Callable[..., bool]) -> None:
     assert snap_compare(NavigationApp(session, symbols=ASCII, polls_per_s=0))
 
 
-@pytest.mark.parametrize(
-    "key", ["question_mark", "d", "l", "q"], ids=["help", "devices", "layers", "quit"]
-)
-def test_page(key: str, snap_compare: Callable[..., bool]) -> None:
-    shown = snapshots.navigating(layers=snapshots.navigating().stage.layers)
+PAGES = {
+    "help": "question_mark",
+    "devices": "d",
+    "layers": "l",
+    "quit": "q",
+    "steps": "k",
+    "gates": "t",
+    "events": "e",
+    "tools": "u",
+    "box": "b",
+    "picks": "p",
+    "palette": "ctrl+p",
+}
+
+
+@SIZES
+@pytest.mark.parametrize("page", list(PAGES))
+def test_page(page: str, size: tuple[int, int], snap_compare: Callable[..., bool]) -> None:
+    stage = STAGES[2]
+    shown = with_tools(
+        stage=stage,
+        layers=stage.layers,
+        steps=STEPS,
+        left_picture=snapshots.picture(1.0, 180, 320),
+        picture_size_px=(320, 180),
+    )
     app = NavigationApp(snapshots.ScriptedSession(shown), polls_per_s=0)
-    assert snap_compare(app, press=[key])
+    assert snap_compare(app, press=[PAGES[page]], terminal_size=size)
 
 
-def test_the_legend_on_a_tall_terminal(snap_compare: Callable[..., bool]) -> None:
-    app = NavigationApp(snapshots.ScriptedSession(snapshots.navigating()), polls_per_s=0)
-    assert snap_compare(app, press=["question_mark"], terminal_size=(160, 48))
+@pytest.mark.parametrize("page", [one for one in PAGES if one not in ("quit", "palette")])
+def test_the_keys_of_a_page_are_not_cut_on_the_smallest_terminal(page: str) -> None:
+    async def script(app: BellCounter, pilot: Pilot[Any]) -> None:
+        await pilot.press(PAGES[page])
+        await pilot.pause()
+        assert len(app.text_of(PageKeys)) <= 80
+
+    play(with_tools(), script, (80, 24))
