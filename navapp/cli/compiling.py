@@ -1,6 +1,5 @@
 """Runs work whose kernels may have to be compiled first, and says so only then."""
 
-import sys
 import time
 from collections.abc import Callable
 from typing import TypeVar
@@ -13,6 +12,18 @@ T = TypeVar("T")
 _SHORT_S = 2.0
 
 
+def tell_kernels(diagnostics: Diagnostics) -> Callable[[int, str], None]:
+    """What a watch calls at every kernel: it counts on a terminal, and says one line elsewhere."""
+
+    def tell(count: int, name: str) -> None:
+        if diagnostics.has_live_line:
+            diagnostics.tell_live(f"compiling kernels, once on a machine: {count} ({name})")
+        elif count == 1:
+            diagnostics.note("compiling kernels, once on a machine")
+
+    return tell
+
+
 def run_compiled(work: Callable[[], T], diagnostics: Diagnostics) -> T:
     """The work's answer, its own timings without compilation.
 
@@ -21,19 +32,10 @@ def run_compiled(work: Callable[[], T], diagnostics: Diagnostics) -> T:
     """
     from navapp.geometry.compilation import watch_compilation
 
-    is_terminal = sys.stderr.isatty()
-
-    def tell(count: int, name: str) -> None:
-        if is_terminal and not diagnostics.is_quiet:
-            sys.stderr.write(f"\r\x1b[Kcompiling kernels, once on a machine: {count} ({name})")
-            sys.stderr.flush()
-        elif count == 1:
-            diagnostics.note("compiling kernels, once on a machine")
-
     started = time.perf_counter()
-    with watch_compilation(tell) as compilation:
+    with watch_compilation(tell_kernels(diagnostics)) as compilation:
         answer = work()
-    if compilation.count and is_terminal and not diagnostics.is_quiet:
-        sys.stderr.write("\n")
+    if compilation.count:
+        diagnostics.tell_live(f"kernels compiled: {compilation.count}", is_last=True)
     is_short = time.perf_counter() - started < _SHORT_S
     return work() if compilation.count or is_short else answer

@@ -41,14 +41,24 @@ class Diagnostics:
         if self.is_verbose and not self.is_quiet:
             sys.stderr.write(f"navapp: {text}\n")
 
+    @property
+    def has_live_line(self) -> bool:
+        """Stderr is a terminal, and details do not run through it."""
+        return not (self.is_quiet or self.is_verbose) and sys.stderr.isatty()
+
+    def tell_live(self, text: str, *, is_last: bool = False) -> None:
+        """A line on stderr that the next one replaces; nothing where that cannot be."""
+        if self.has_live_line:
+            sys.stderr.write(f"\r\x1b[K{text}" + ("\n" if is_last else ""))
+            sys.stderr.flush()
+
     def progress(self, what: str, share: float) -> None:
         """A bar on stderr, when that is a terminal and details do not run through it."""
-        if self.is_quiet or self.is_verbose or not sys.stderr.isatty():
+        if not self.has_live_line:
             return
         n = round(30 * min(max(share, 0.0), 1.0))
-        end = "\n" if share >= 1.0 else ""
-        sys.stderr.write(f"\r{what} [{'#' * n}{'.' * (30 - n)}] {100 * share:3.0f} %{end}")
-        sys.stderr.flush()
+        bar = f"{what} [{'#' * n}{'.' * (30 - n)}] {100 * share:3.0f} %"
+        self.tell_live(bar, is_last=share >= 1.0)
 
 
 def report(text: str) -> None:

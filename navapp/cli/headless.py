@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from navapp.cli.compiling import tell_kernels
 from navapp.cli.diagnostics import Diagnostics, write_json
 from navapp.cli.operation_table import StepResult, format_steps, steps_to_json
 from navapp.cli.results import (
@@ -24,6 +25,7 @@ from navapp.control.frame_result import FrameResult
 from navapp.control.operators import Operator
 from navapp.control.runner import run_headless
 from navapp.errors import NavappError, PriorError, ResultError, RigError
+from navapp.geometry.compilation import watch_compilation
 from navapp.geometry.rig import StereoRig
 from navapp.limb import LimbMeasurement
 from navapp.values import Measured, Prior
@@ -110,6 +112,7 @@ class FrameLog:
         self.results: list[FrameResult] = []
         self._n_expected = n_expected
         self._diagnostics = diagnostics
+        self._started = time.perf_counter()
 
     def __call__(self, result: FrameResult) -> None:
         """A frame was handled."""
@@ -118,8 +121,20 @@ class FrameLog:
         picture = replace(result.picture, image=_NO_PICTURE)
         self.results.append(replace(result, frame=frame, picture=picture))
         self._diagnostics.detail(frame_text(result))
-        if self._n_expected:
-            self._diagnostics.progress("frames", len(self.results) / self._n_expected)
+        self._diagnostics.tell_live(self._line(result), is_last=self.is_full)
+
+    def _line(self, result: FrameResult) -> str:
+        """How far it is."""
+        n, expected = len(self.results), self._n_expected
+        far = f"frame {n}" if expected is None else f"frame {n} of {expected}"
+        rate = n / max(time.perf_counter() - self._started, 1e-3)
+        word = "" if result.tracked is None else f" {result.tracked.verdict.status.value}"
+        return f"{far}, {rate:.1f} a second: {result.state.value}{word}"
+
+    @property
+    def has_end(self) -> bool:
+        """It is known how many frames are to come."""
+        return self._n_expected is not None
 
     @property
     def is_full(self) -> bool:
@@ -127,11 +142,28 @@ class FrameLog:
         return self._n_expected is not None and len(self.results) >= self._n_expected
 
 
-def run_session(controller: SessionController, operator: Operator, log: FrameLog) -> float:
-    """Run to the end of the source, or until the log is full; answers with the seconds it took."""
+def run_session(
+    controller: SessionController, operator: Operator, log: FrameLog, diagnostics: Diagnostics
+) -> float:
+    """Run to the end of the source, or until the log is full; answers with the seconds it took.
+
+    A session without an end is ended by an interrupt, and its result is told as any other's.
+    """
     started = time.perf_counter()
-    run_headless(controller, operator, lambda: log.is_full)
-    return time.perf_counter() - started
+    with watch_compilation(tell_kernels(diagnostics)) as compilation:
+        try:
+            run_headless(controller, operator, lambda: log.is_full)
+        except KeyboardInterrupt:
+            if log.has_end:
+                raise
+    seconds = time.perf_counter() - started
+    if not log.is_full:
+        diagnostics.tell_live(f"{len(log.results)} frames", is_last=True)
+    if compilation.count:
+        diagnostics.note(
+            f"kernels compiled meanwhile: {compilation.count}; the next session is quicker"
+        )
+    return seconds
 
 
 def _say_what_was_written(options: argparse.Namespace, diagnostics: Diagnostics) -> None:

@@ -117,6 +117,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     from navapp.devices import open_recording
 
     _check(options)
+    diagnostics.note(f"replaying {options.sequence}")
     configuration = load(find_file(options.config))
     settings = _settings(configuration, options)
     replay = _prepare(configuration, options, diagnostics)
@@ -132,7 +133,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
                 check_start(specification.prior, bone)
     opened = open_recording(options.sequence, settings, rig, configuration)
     log = FrameLog(opened.devices.camera.info.n_frames, diagnostics)
-    seconds, failure = _run_session(replay, opened, log, options, settings.rate_hz)
+    seconds, failure = _run_session(replay, opened, log, options, settings.rate_hz, diagnostics)
     frames = [frame_to_json(result, {}) for result in log.results]
     moved = replay.rig_moved
     told = None if moved is None else rig_alarm_to_json(rig.name, *moved)
@@ -147,6 +148,7 @@ def _run_session(
     log: "FrameLog",
     options: argparse.Namespace,
     rate_hz: float,
+    diagnostics: Diagnostics,
 ) -> "tuple[float, NavappError | None]":
     """Handle all frames; the seconds that they took, and the fault in which the session ended."""
     from navapp.cli.headless import run_session
@@ -170,7 +172,7 @@ def _run_session(
             hooks=SessionHooks(on_frame=tuple(listeners)),
         )
         undo.callback(controller.close)
-        seconds = run_session(controller, replay.operator, log)
+        seconds = run_session(controller, replay.operator, log, diagnostics)
     return seconds, controller.failure
 
 

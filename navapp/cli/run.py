@@ -93,6 +93,9 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
         )
     check_writable(options.json)
     configuration = _with_options(load(find_file(options.config)), options)
+    if options.headless:
+        length = f"{options.frames} frames" if options.frames else "until it is interrupted"
+        diagnostics.note(f"session without a screen, {configuration.camera.backend}: {length}")
     script = _script(options.operator)
     with ExitStack() as undo:
         if options.mirror:
@@ -178,7 +181,7 @@ def _run_headless(
         undo.callback(session.opened.devices.close)
         controller = make_controller(session, is_inline=True, on_frame=[log], undo=undo)
         undo.callback(controller.close)
-        seconds = run_session(controller, operator, log)
+        seconds = run_session(controller, operator, log, diagnostics)
     frames = [frame_to_json(result, _tre_mm(result, session)) for result in log.results]
     rig = rig_to_json(controller.snapshot)
     measured = [result.measured for result in log.results]

@@ -1,5 +1,6 @@
 """Steps a controller: in a loop for headless sessions, in a thread for the screen."""
 
+import math
 import threading
 from collections.abc import Callable
 from dataclasses import replace
@@ -60,7 +61,7 @@ class SessionRunner:
         if not self._compilation.is_running:
             return snapshot
         what = f"compiling kernels, once on a machine: {self._compilation.count} so far"
-        return replace(snapshot, progress=Progress(what, None))
+        return replace(snapshot, progress=Progress(what, math.nan))
 
     def submit(self, command: Command) -> None:
         """Hand a command over."""

@@ -103,7 +103,7 @@ class Progress:
     """Long work that is running."""
 
     what: str
-    share: float | None  # that is done; None: not known
+    share: float  # that is done; NaN: not known
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,5 +1,7 @@
 """The progress line of long work: what, how far, and how to cancel."""
 
+import math
+
 from textual.content import Content
 
 from navapp.control.states import SessionState
@@ -26,7 +28,7 @@ class WorkLine(TextView):
             return [Content.styled(cut(text, width, view.symbols), Level.BAD.value)]
         if progress is None:
             return [Content("")]
-        if progress.share is None:
+        if math.isnan(progress.share):
             return [Content(f" {cut(progress.what, width - 1, view.symbols)}")]
         is_cancellable = view.snapshot.state is SessionState.REGISTERING
         hint = "  c cancel" if is_cancellable else ""

@@ -322,7 +322,7 @@ def _run_knee(seed: int, errors: Errors) -> str:
         log = FrameLog(_N_FRAMES, quiet)
         controller = make_controller(session, is_inline=True, on_frame=[log], undo=undo)
         undo.callback(controller.close)
-        run_session(controller, ScriptedOperator((ScriptStep(do="register"),)), log)
+        run_session(controller, ScriptedOperator((ScriptStep(do="register"),)), log, quiet)
     plan, simulation = session.specification.plan, session.opened.simulation
     meshes = tuple(plan.bones[name].mesh for name in _BONES)
     found, first_s = [], float("nan")
