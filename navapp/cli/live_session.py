@@ -56,11 +56,11 @@ def prepare_session(
     from navapp.cli.headless import check_accepted, check_not_expired, check_start
     from navapp.cli.other_bones import check_others
     from navapp.cli.session_tools import read_tools
-    from navapp.cli.simulated_patient import make_built_in_plan, make_nominal_prior
     from navapp.control.prior_files import read_prior
     from navapp.control.specification import specify_session
     from navapp.control.stages import stage_by_name
     from navapp.devices import open_live
+    from navapp.devices.simulated_plan import make_built_in_plan, make_nominal_prior
     from navapp.preop import read_plan
     from navapp.values import Prior
 

@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.cli.simulated_patient import make_built_in_plan
+from navapp.devices.simulated_plan import make_built_in_plan
 from navapp.devices.simulated_room import simulation_of
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform

@@ -15,11 +15,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from navapp.cli.simulated_patient import make_built_in_plan
 from navapp.config import load
 from navapp.control.stages import STAGES
 from navapp.devices import OpenedDevices, open_live
 from navapp.devices.simulated_mirror import true_display
+from navapp.devices.simulated_plan import make_built_in_plan
 from navapp.overlay import (
     LAYERS,
     LeftView,

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from navapp.cli.main import run
-from navapp.cli.simulated_patient import make_built_in_plan
 from navapp.config import SimulationSection
 from navapp.control.stages import STAGES
+from navapp.devices.simulated_plan import make_built_in_plan
 from navapp.devices.simulated_room import Pace, make_simulated_camera, scenario_of, simulation_of
 from navapp.geometry.ply import write_ply
 from navapp.preop import read_plan, write_plan

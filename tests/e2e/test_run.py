@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from navapp.cli.main import run
-from navapp.cli.simulated_patient import make_built_in_plan
 from navapp.config import SimulationSection
+from navapp.devices.simulated_plan import make_built_in_plan
 from navapp.devices.simulated_room import Pace, make_simulated_camera, scenario_of, simulation_of
 from navapp.preop import write_plan
 from navapp.values import Plan, StageContent

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from navapp.devices import Simulation
+from navapp.devices.simulated_room import Simulation
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.values import (
     ANKLE_CENTRE,

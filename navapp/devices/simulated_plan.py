@@ -1,7 +1,7 @@
 """Plan and prior of the simulated patient, used when none is given."""
 
-from navapp.cli.simulated_content import make_built_in_content
-from navapp.devices import Simulation
+from navapp.devices.simulated_content import make_built_in_content
+from navapp.devices.simulated_room import Simulation
 from navapp.geometry.directions import ViewCone
 from navapp.geometry.mesh import TriangleMesh
 from navapp.values import BoneModel, Plan, Prior
