@@ -4,11 +4,13 @@ import numpy as np
 
 from navapp.preop.cartilage import figures_of
 from navapp.preop.plan_origin import PlanOrigin
-from navapp.values import BoneModel, Plan
+from navapp.preop.plan_view import PlanView
+from navapp.values import BoneModel
 
 
-def make_origin_rows(plan: Plan, origin: PlanOrigin) -> list[tuple[str, str]]:
+def make_origin_rows(view: PlanView) -> list[tuple[str, str]]:
     """Names and values."""
+    plan, origin = view.plan, view.origin
     rows = [("digest", plan.digest), ("made from", origin.kind)]
     if origin.description:
         rows.append(("series", origin.description))
@@ -24,6 +26,8 @@ def make_origin_rows(plan: Plan, origin: PlanOrigin) -> list[tuple[str, str]]:
         rows.append(
             ("blur of the scanner", f"{plane:.2f} mm in the slices, {axial:.2f} mm across (sd)")
         )
+    if view.points_beyond:
+        rows.append(("beyond the slices", ", ".join(view.points_beyond)))
     return rows
 
 

@@ -33,7 +33,7 @@ def make_summary_page(view: PlanView, folder: Path) -> str:
         "<p>Research software, not for clinical use. Coordinates are LPS, lengths mm.</p>",
         warnings or "<p>No warnings.</p>",
         "<h2>Where it comes from</h2>",
-        _table(make_origin_rows(plan, origin)),
+        _table(make_origin_rows(view)),
         "<h2>Bones</h2>",
         _bones(view),
     ]

@@ -56,22 +56,28 @@ class PlanView:
 
     def find_points(self, direction: Direction, index: int) -> dict[str, FloatArray]:
         """Name -> (2,) column and row of the landmarks and targets nearest to this slice."""
-        points_mm = name_points(self.plan)
-        if not points_mm:
-            return {}
-        all_mm = np.array(list(points_mm.values()))
-        is_near = self.grid.find_slices(direction, all_mm) == index
-        pixels = self.grid.find_pixels(direction, all_mm)
-        return {name: at for name, at, near in zip(points_mm, pixels, is_near, strict=True) if near}
+        return {
+            name: self.grid.find_pixels(direction, point_mm)
+            for name, point_mm in self.points_mm.items()
+            if self.grid.find_slices(direction, point_mm[None])[0] == index
+        }
 
     def list_pointed(self, direction: Direction) -> NDArray[np.intp]:
         """Indices of the slices that have a landmark or a target, rising."""
-        points_mm = name_points(self.plan)
-        if not points_mm:
-            return np.empty(0, dtype=np.intp)
-        indices = np.unique(self.grid.find_slices(direction, np.array(list(points_mm.values()))))
-        inside = (indices >= 0) & (indices < self.grid.count_slices(direction))
-        return indices[inside]
+        points_mm = np.reshape(list(self.points_mm.values()), (-1, 3))
+        return np.unique(self.grid.find_slices(direction, points_mm))
+
+    @property
+    def points_mm(self) -> dict[str, FloatArray]:
+        """Name -> (3,) LPS mm of the landmarks and targets that lie within the slices."""
+        named = name_points(self.plan)
+        return {name: point_mm for name, point_mm in named.items() if self.grid.holds(point_mm)}
+
+    @property
+    def points_beyond(self) -> tuple[str, ...]:
+        """Names of those that lie outside: the centres of hip and ankle."""
+        named = name_points(self.plan)
+        return tuple(name for name, point_mm in named.items() if not self.grid.holds(point_mm))
 
 
 def make_plan_view(

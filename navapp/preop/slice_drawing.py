@@ -66,7 +66,7 @@ def draw_slice(
         index: of the slice.
         size_px: width and height of the picture, in the proportions of the slice.
         window_hu: shown as black and as white; None for all that is stored.
-        thickness_px: of the lines.
+        thickness_px: of crosses and bar; contours are fine, so that they hide nothing.
         has_numbers: crosses are numbered, from 1.
     """
     grey = apply_window(view.volume, view.volume.slice_of(direction, index), window_hu)
@@ -141,9 +141,7 @@ class _Drawing:
         import cv2
 
         lines = list(self._find_places(segments))
-        cv2.polylines(
-            self.picture, lines, False, colour[::-1], self._thickness_px, cv2.LINE_AA, _SHIFT
-        )
+        cv2.polylines(self.picture, lines, False, colour[::-1], 1, cv2.LINE_AA, _SHIFT)
 
     def add_cross(self, at: FloatArray, colour: Colour, label: str) -> None:
         arm = max(3.0, _CROSS_SHARE * min(self.picture.shape[:2])) / self._scale

@@ -78,6 +78,12 @@ class SliceGrid:
         nearest: NDArray[np.intp] = np.floor(steps + 0.5).astype(np.intp)
         return nearest
 
+    def holds(self, point_mm: FloatArray) -> bool:
+        """Whether a point lies in one of the cubes."""
+        found = [self.find_slices(one, point_mm[None])[0] for one in DIRECTIONS]
+        most = [self.count_slices(one) for one in DIRECTIONS]
+        return all(0 <= index < n for index, n in zip(found, most, strict=True))
+
     def shape_of(self, direction: Direction) -> tuple[int, int]:
         """Rows and columns of a slice."""
         return self.size[direction.down], self.size[direction.across]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.transform import FloatArray
-from navapp.preop.plan_view import PlanView, name_points
+from navapp.preop.plan_view import PlanView
 from navapp.preop.slice_drawing import (
     BONE_COLOURS,
     OTHER_COLOUR,
@@ -190,12 +190,11 @@ def _place_points(
     """Shown slice -> landmarks and targets that are nearest to it, with their places."""
     placed: dict[int, list[tuple[str, float, float]]] = {}
     shown = np.array(indices)
-    for name, point_mm in name_points(view.plan).items():
+    for name, point_mm in view.points_mm.items():
         index = int(view.grid.find_slices(direction, point_mm[None])[0])
         nearest = int(shown[np.abs(shown - index).argmin()])
-        if abs(nearest - index) <= indices.step // 2:
-            x, y = (view.grid.find_pixels(direction, point_mm) + 0.5).round(1).tolist()
-            placed.setdefault(nearest, []).append((name, x, y))
+        x, y = (view.grid.find_pixels(direction, point_mm) + 0.5).round(1).tolist()
+        placed.setdefault(nearest, []).append((name, x, y))
     return placed
 
 

@@ -259,6 +259,7 @@ ACTIONS: tuple[Action, ...] = (
         "check of the mirror: the cross lies on its point",
         lambda _: ConfirmCross(),
     ),
+    Action("plan", "i", "plan", "look at the plan: slices, bones, warnings"),
     Action("calibration", "h", "calibration", "see how old the calibrations are, and what moved"),
     Action("settings", "s", "settings", "see the settings in force"),
     Action("devices", "d", "devices", "see the devices in detail", slot="devices"),

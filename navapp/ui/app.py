@@ -32,6 +32,7 @@ from navapp.control.states import (
     Snapshot,
 )
 from navapp.geometry.box import Box
+from navapp.preop import PlanView
 from navapp.ui.actions import (
     ACTION_OF_KEY_EVERYWHERE,
     ACTION_OF_NAME,
@@ -49,10 +50,12 @@ from navapp.ui.palette import ActionProvider
 from navapp.ui.picks_page import PicksChecked, PicksPage, Place
 from navapp.ui.pictures.graphics import Graphics
 from navapp.ui.pictures.picture_view import PictureView
+from navapp.ui.plan_page import PlanPage
 from navapp.ui.quiet_app import QuietApp
 from navapp.ui.screens import ViewScreen
 from navapp.ui.session import Session
 from navapp.ui.settings_page import SettingsPage
+from navapp.ui.slice_walk import SliceWalk
 from navapp.ui.start_page import StartChosen, StartPage
 from navapp.ui.steps_page import StepsPage, step_of_key
 from navapp.ui.symbols import UNICODE, Symbols
@@ -94,6 +97,7 @@ class NavigationApp(QuietApp):
         graphics: that the terminal draws; None: half blocks.
         hints: told when it starts.
         background: settings and calibrations; None: their pages say that they are not known.
+        plan: to look at; None: it cannot be looked at.
     """
 
     CSS_PATH = Path(__file__).with_name("navapp.tcss")
@@ -113,6 +117,7 @@ class NavigationApp(QuietApp):
         graphics: Graphics | None = None,
         hints: Sequence[str] = (),
         background: Background | None = None,
+        plan: PlanView | None = None,
     ) -> None:
         super().__init__()
         if graphics is not None:
@@ -125,6 +130,7 @@ class NavigationApp(QuietApp):
         self._polls_per_s = polls_per_s
         self._hints = tuple(hints)
         self._background = background
+        self._walk = None if plan is None else SliceWalk(plan)
         self._n_polls = 0
         self._n_unchanged = 0
         snapshot = session.snapshot()
@@ -187,6 +193,8 @@ class NavigationApp(QuietApp):
             self.push_screen(PicksPage(view, self._picks))
         elif name == "near":
             self._toggle_near()
+        elif name == "plan":
+            self._open_plan()
         elif name in _BACKGROUND_PAGES:
             self._open_background(name)
         elif name in _PAGES:
@@ -202,6 +210,13 @@ class NavigationApp(QuietApp):
             self.notify(f"the {name} of this session is not known here", severity="warning")
         else:
             self.push_screen(_BACKGROUND_PAGES[name](self._view, self._background))
+
+    def _open_plan(self) -> None:
+        """Its slices, where they were left."""
+        if self._walk is None:
+            self.notify("the plan of this session is not at hand", severity="warning")
+        else:
+            self.push_screen(PlanPage(self._view, self._walk))
 
     def _toggle_near(self) -> None:
         """The region around the bone, or the whole picture."""

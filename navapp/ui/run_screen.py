@@ -10,6 +10,7 @@ from pathlib import Path
 
 from navapp.control.states import DeviceHealth, EventLevel, SessionState, Snapshot
 from navapp.errors import DeviceError, NavappError, RigError
+from navapp.preop import PlanView
 from navapp.ui.app import NavigationApp
 from navapp.ui.background import Background
 from navapp.ui.pictures.graphics import Graphics, Wish, find_graphics
@@ -31,6 +32,7 @@ def run_screen(
     hints: Sequence[str] = (),
     guide: Guide[Snapshot] | None = None,
     background: Background | None = None,
+    plan: PlanView | None = None,
 ) -> int:
     """Run the screen until it ends, then stop the session, whatever happened.
 
@@ -42,6 +44,7 @@ def run_screen(
         hints: told when it starts.
         guide: of the tutorial, shown above the picture.
         background: settings and calibrations, for the pages that show them.
+        plan: for the page that shows it.
 
     Returns:
         Exit code; 128 and the number of the signal that ended it. After a failure one sentence is
@@ -64,6 +67,7 @@ def run_screen(
                 graphics=graphics,
                 hints=told,
                 background=background,
+                plan=plan,
             )
             code = asyncio.run(drive(app))
             failure = app.failure

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from navapp.preop import PlanOrigin, make_even_cartilage
+from navapp.preop import PlanOrigin, make_even_cartilage, make_plan_view
 from navapp.preop.plan_facts import make_bone_rows, make_origin_rows
 from navapp.values import BoneModel, Plan
 from tests.geometry.shapes import sphere
@@ -15,13 +15,20 @@ def test_where_a_plan_from_a_ct_comes_from_is_told_with_its_digest() -> None:
         "CT", "knee", (0.5, 0.5, 0.8), (200, 210, 150), 200.0, 1220.4, (0.5, 0.6), {"femur": 0.98}
     )
     plan = Plan({"femur": FEMUR})
-    rows = dict(make_origin_rows(plan, origin))
+    rows = dict(make_origin_rows(make_plan_view(plan, origin)))
     assert rows["digest"] == plan.digest
     assert rows["made from"] == "CT"
     assert rows["series"] == "knee"
     assert rows["voxels"] == "200 x 210 x 150 of 0.5 x 0.5 x 0.8 mm"
     assert rows["density of cortex"].startswith("1220 HU")
-    assert set(dict(make_origin_rows(plan, PlanOrigin()))) == {"digest", "made from"}
+    bare = dict(make_origin_rows(make_plan_view(plan)))
+    assert bare == {"digest": plan.digest, "made from": "surfaces"}
+
+
+def test_points_that_no_slice_shows_are_named() -> None:
+    targets = {"femur/hip_centre": np.array([0.0, 0.0, 400.0]), "femur/entry": np.zeros(3)}
+    rows = dict(make_origin_rows(make_plan_view(Plan({"femur": FEMUR}, targets))))
+    assert rows["beyond the slices"] == "femur/hip_centre"
 
 
 def test_a_bone_s_size_side_and_cartilage_are_told() -> None:

@@ -55,6 +55,10 @@ def test_slices_with_points_are_known_and_what_lies_beyond_the_grid_is_not_among
     view = make_plan_view(make_plan())
     positions = [view.grid.position_mm(AXIAL, int(k)) for k in view.list_pointed(AXIAL)]
     assert positions == [2.0, 3.0, 4.0]
+    coronal = DIRECTIONS[1]
+    (index,) = view.grid.find_slices(coronal, np.zeros((1, 3)))
+    assert "femur/hip" not in view.find_points(coronal, int(index))
+    assert view.points_beyond == ("femur/hip",)
     bare = make_plan_view(make_plan(targets={}, content=SurgicalContent()))
     assert len(bare.list_pointed(AXIAL)) == 0
     assert bare.find_points(AXIAL, 5) == {}
