@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from navapp.config import Configuration
     from navapp.control.frame_result import FrameResult
     from navapp.control.scripted_operator import ScriptStep
+    from navapp.preop import PlanView
     from navapp.ui.background import Background
 
 _EXAMPLE = """\
@@ -233,6 +234,7 @@ def _run_screen(session: LiveSession, options: argparse.Namespace, diagnostics: 
 
     with ExitStack() as undo:
         undo.callback(session.opened.devices.close)
+        plan = _plan_view(session)
         controller = make_controller(session, is_inline=False, on_frame=[count], undo=undo)
         runner = SessionRunner(controller)
         undo.callback(runner.stop)
@@ -243,6 +245,7 @@ def _run_screen(session: LiveSession, options: argparse.Namespace, diagnostics: 
             pictures=session.configuration.ui.pictures,
             hints=_hints(session, options),
             background=_background(session, options),
+            plan=plan,
             guide=options.guide,
         )
     if runner.error is not None:
@@ -251,6 +254,14 @@ def _run_screen(session: LiveSession, options: argparse.Namespace, diagnostics: 
     if folder is not None:
         diagnostics.say(f"recorded session: {folder}")
     return code
+
+
+def _plan_view(session: LiveSession) -> "PlanView":
+    """The plan to look at; that of the simulated rig has surfaces alone."""
+    from navapp.preop import make_plan_view, read_plan_view
+
+    path, plan = session.configuration.plan.path, session.specification.plan
+    return make_plan_view(plan) if path is None else read_plan_view(path, plan)
 
 
 def _background(session: LiveSession, options: argparse.Namespace) -> "Background":
