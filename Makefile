@@ -1,4 +1,4 @@
-# navapp: two commands for a stranger, `make run` and `make test`.
+# navapp: two commands for a stranger, `make tutorial` and `make test`.
 
 PYTHON ?= python3
 UV     ?= $(shell command -v uv 2>/dev/null)
@@ -34,14 +34,20 @@ SYSTEM_DEPS := python3-venv libgl1 libegl1 libgomp1 libusb-1.0-0 tmux \
     xvfb xserver-xorg-core xserver-xorg-video-dummy x11-xserver-utils \
     libxcb-randr0 libxcb-render0 libxcb-shm0 libxcb-xfixes0
 
-.PHONY: run test test-all check setup bench bench-peers system-deps clean help
+.PHONY: run tutorial window test test-all check setup bench bench-peers system-deps clean help
 
 help:           ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/'
 
 run: setup      ## the application on the simulated rig
-	@echo "with a display in a half-silvered mirror: $(BIN)/navapp run --mirror (docs/mirror.md, Practise)"
+	@echo "new here: make tutorial; with a display in a half-silvered mirror: $(BIN)/navapp run --mirror"
 	@$(BIN)/navapp run
+
+tutorial: setup  ## four steps on simulated devices: room, calibration, plan, navigation
+	@$(BIN)/navapp tutorial
+
+window: setup   ## the application, with its picture in a window of the desktop
+	@$(BIN)/navapp run --window
 
 test: setup  ## style, types, import rules and the tests: some minutes
 	@$(MAKE) --no-print-directory -j2 --output-sync=line check bytecode checked-kernels tests

@@ -17,7 +17,13 @@ _BOARD = {
     "dictionary": "DICT_4X4_100",
 }
 # Nobody's own configuration takes part.
-_CONFIGURATION = '# Devices of the tutorial: all simulated.\n[camera]\nbackend = "simulated"\n'
+_CONFIGURATION = """\
+# Devices of the tutorial: all simulated.
+[camera]
+backend = "simulated"
+# The simulator computes its pictures: few enough that a slow computer has time to follow the bone.
+rate_hz = 6.0
+"""
 
 
 @dataclass(frozen=True, slots=True)

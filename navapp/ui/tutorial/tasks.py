@@ -70,7 +70,7 @@ def make_capture_guide() -> Guide[CaptureSnapshot]:
                 lambda snapshot: snapshot.n_kept >= 5,
             ),
             Task(
-                "Wait until the bar is below its limit: about a minute. The hand needs no help.",
+                "Wait for ENOUGH at the top right: the bar is below its limit. About a minute.",
                 "enough: the rig is as good as it has to be",
                 lambda snapshot: snapshot.is_enough,
             ),

@@ -71,7 +71,7 @@ def test_the_capture_has_them_too() -> None:
             return str(lines.render()), wish.region.y - lines.region.y
 
     text, below = asyncio.run(run())
-    assert "Wait until the bar" in text
+    assert "Wait for ENOUGH" in text
     assert below > 3, "the lines stand above the pictures"
 
 
