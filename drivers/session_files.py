@@ -42,6 +42,7 @@ class SessionWriter:
 
     def __init__(self, folder: str | Path) -> None:
         self._folder = Path(folder)
+        self._n_bytes = 0
         path = self._folder / TABLE_NAME
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
@@ -70,6 +71,11 @@ class SessionWriter:
         """Close."""
         self.close()
 
+    @property
+    def n_bytes(self) -> int:
+        """So many were written, pictures and table."""
+        return self._n_bytes
+
     def add(self, frame: StereoFrame, with_pictures: bool) -> None:
         """Append a frame; its pictures become lossless PNG files named after its sequence.
 
@@ -81,8 +87,8 @@ class SessionWriter:
             names = (f"left_{frame.sequence:06d}.png", f"right_{frame.sequence:06d}.png")
         try:
             if with_pictures:
-                (self._folder / names[0]).write_bytes(_png(frame.left))
-                (self._folder / names[1]).write_bytes(_png(frame.right))
+                for name, picture in zip(names, (frame.left, frame.right), strict=True):
+                    self._n_bytes += (self._folder / name).write_bytes(_png(picture))
             self._write_line((frame.sequence, frame.captured_ns, frame.skew_ns, *names))
         except OSError as error:
             raise _not_writable(self._folder, error) from error
@@ -92,7 +98,7 @@ class SessionWriter:
         self._table.close()
 
     def _write_line(self, values: tuple[int | str, ...]) -> None:
-        self._table.write(",".join(str(value) for value in values) + "\n")
+        self._n_bytes += self._table.write(",".join(str(value) for value in values) + "\n")
         self._table.flush()
 
 

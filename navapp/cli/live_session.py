@@ -261,4 +261,5 @@ def _make_hooks(
         on_command=(recorder.on_command,),
         on_take_over=(recorder.on_take_over,),
         on_other_take_over=(recorder.on_other_take_over,),
+        recorder=recorder,
     )

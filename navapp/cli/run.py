@@ -220,6 +220,7 @@ def _tre_mm(result: "FrameResult", session: LiveSession) -> dict[str, float | No
 
 
 def _run_screen(session: LiveSession, options: argparse.Namespace, diagnostics: Diagnostics) -> int:
+    from navapp.cli.session_end import KeptFiles
     from navapp.control.commands import Quit
     from navapp.control.runner import SessionRunner
     from navapp.ui.run_screen import run_screen
@@ -235,13 +236,15 @@ def _run_screen(session: LiveSession, options: argparse.Namespace, diagnostics: 
     with ExitStack() as undo:
         undo.callback(session.opened.devices.close)
         plan = _plan_view(session)
+        log = log_folder() / "navapp.log"
+        kept = KeptFiles.begin(session.configuration.recording.folder, log)
         controller = make_controller(session, is_inline=False, on_frame=[count], undo=undo)
         runner = SessionRunner(controller)
         undo.callback(runner.stop)
         runner.start()
         code = run_screen(
             runner,
-            log_folder() / "navapp.log",
+            log,
             pictures=session.configuration.ui.pictures,
             hints=_hints(session, options),
             background=_background(session, options),
@@ -250,9 +253,8 @@ def _run_screen(session: LiveSession, options: argparse.Namespace, diagnostics: 
         )
     if runner.error is not None:
         raise runner.error
-    folder = session.configuration.recording.folder
-    if folder is not None:
-        diagnostics.say(f"recorded session: {folder}")
+    is_whole = controller.snapshot.is_recording
+    kept.tell(n_frames, is_whole=is_whole, diagnostics=diagnostics)
     return code
 
 

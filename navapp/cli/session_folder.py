@@ -10,6 +10,7 @@ from typing import get_args
 from drivers.session_files import SessionWriter
 from navapp import __version__
 from navapp.config import Configuration, format_toml
+from navapp.control.disc_room import DiscRoom, check_room_to_begin
 from navapp.control.operators import RecordedEvents, read_events
 from navapp.control.prior_files import prior_to_json
 from navapp.control.recorder import BackgroundSink, SessionRecorder
@@ -51,9 +52,12 @@ def start_recording(
     """Make a session folder and a recorder into it.
 
     Raises:
-        InputError: the folder holds a session already, or cannot be written.
+        InputError: the folder holds a session already, cannot be written, or has no room.
     """
     folder = Path(folder)
+    with_pictures = configuration.recording.pictures
+    if with_pictures:
+        check_room_to_begin(folder)
     frames = SessionWriter(folder)
     rig, plan = specification.rig, specification.plan
     write_rig(folder / _RIG, rig)
@@ -88,7 +92,10 @@ def start_recording(
     }
     write_whole(folder / _FILE, json.dumps(content, indent=1).encode())
     return SessionRecorder(
-        folder, BackgroundSink(frames), with_pictures=configuration.recording.pictures
+        folder,
+        BackgroundSink(frames),
+        with_pictures=with_pictures,
+        room=DiscRoom(folder, lambda: frames.n_bytes),
     )
 
 

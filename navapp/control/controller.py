@@ -138,7 +138,7 @@ class SessionController:
         self._maker = SnapshotMaker(
             self._session, self._camera, self._display, self._monitored, self._mirror_checking,
             _make_mirror_judge(specification, composer), self._eye, specification,
-            self._rig_watch, gates, self._tools, self._patient,
+            self._rig_watch, gates, self._tools, self._patient, hooks.recorder,
         )  # fmt: skip
         self._snapshot = self._maker.make()
 

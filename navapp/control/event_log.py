@@ -8,7 +8,7 @@ from drivers.clock import Clock
 from navapp.control.camera_link import Reopen
 from navapp.control.commands import Command
 from navapp.control.frame_result import FrameListener, FrameResult
-from navapp.control.recorder import RecordingStopped
+from navapp.control.recorder import RecordingStopped, SessionRecorder
 from navapp.control.states import Event, EventLevel
 from navapp.errors import UsageError
 
@@ -26,6 +26,7 @@ class SessionHooks:
     on_other_take_over: tuple[Callable[[int], None], ...] = ()
     on_stage: tuple[Callable[[str], None], ...] = ()
     reopen_camera: Reopen | None = None
+    recorder: SessionRecorder | None = None  # that is told; None: nothing is kept
 
 
 class EventLog:

@@ -17,10 +17,14 @@ from typing import Any, Protocol, TextIO
 from drivers.frames import StereoFrame
 from navapp.control.command_files import command_to_json
 from navapp.control.commands import Command
+from navapp.control.disc_room import DiscRoom
 from navapp.control.frame_result import FrameResult
-from navapp.control.states import Event, ToolReading
+from navapp.control.states import DeviceHealth, DeviceLine, Event, ToolReading
 from navapp.errors import InputError, NavappError
 from navapp.values import Measured, MeasuredHole, TrackedFrame
+
+# Less room than for so many minutes is told as trouble.
+_SHORT_MINUTES = 5.0
 
 
 class FrameSink(Protocol):
@@ -88,16 +92,51 @@ class SessionRecorder:
     first failing call raises `RecordingStopped`, later ones do nothing.
     """
 
-    def __init__(self, folder: Path, frames: FrameSink, *, with_pictures: bool = True) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        frames: FrameSink,
+        *,
+        with_pictures: bool = True,
+        room: DiscRoom | None = None,
+    ) -> None:
+        """Begin.
+
+        Args:
+            folder: of the session.
+            frames: keeps the frames.
+            with_pictures: theirs as well.
+            room: on the disc; None: nobody looks.
+        """
         self._frames = frames
-        self._has_stopped = False
+        self._room = room
+        self._stopped = ""
         self._last_sequence = -1
         self._with_pictures = with_pictures
         self._events: TextIO = (folder / "events.jsonl").open("w", encoding="utf-8")
         self._poses: TextIO = (folder / "poses.jsonl").open("w", encoding="utf-8")
 
+    @property
+    def is_running(self) -> bool:
+        """It has not been stopped."""
+        return not self._stopped
+
+    @property
+    def line(self) -> DeviceLine | None:
+        """For the devices panel; None where nobody looks at the disc."""
+        if self._room is None:
+            return None
+        name, left = str(self._room.folder), self._room.left
+        if self._stopped:
+            return DeviceLine("recording", name, DeviceHealth.TROUBLE, self._stopped)
+        is_short = left.minutes_left is not None and left.minutes_left < _SHORT_MINUTES
+        health = DeviceHealth.TROUBLE if is_short else DeviceHealth.OK
+        return DeviceLine("recording", name, health, left.words)
+
     def on_frame(self, result: FrameResult) -> None:
         """A frame was handled."""
+        if self._room is not None:
+            self._attempt(self._room.check)
         self._attempt(lambda: self._frames.add(result.frame, self._with_pictures))
         self._last_sequence = result.frame.sequence
         self._write(
@@ -154,13 +193,13 @@ class SessionRecorder:
             self._write(self._events, {"type": "end", "sequence": self._last_sequence})
 
     def _attempt(self, action: Callable[[], object]) -> None:
-        if self._has_stopped:
+        if self._stopped:
             return
         try:
             action()
         except (OSError, NavappError) as error:
-            self._has_stopped = True
-            raise RecordingStopped(f"recording stopped: {error}") from error
+            self._stopped = f"recording stopped: {error}"
+            raise RecordingStopped(self._stopped) from error
 
     def _write(self, stream: TextIO, value: dict[str, Any]) -> None:
         line = json.dumps(value) + "\n"

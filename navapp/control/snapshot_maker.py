@@ -15,6 +15,7 @@ from navapp.control.mirror_checking import MirrorChecking
 from navapp.control.mirror_error import MirrorError
 from navapp.control.mirror_judging import MirrorJudge
 from navapp.control.patient_checking import PatientChecking
+from navapp.control.recorder import SessionRecorder
 from navapp.control.rig_watch import RigWatch
 from navapp.control.session import Session
 from navapp.control.specification import SessionSpecification
@@ -51,6 +52,7 @@ class SnapshotMaker:
     gates: GateKeeper  # between the stages
     tools: ToolWatch  # that follows tools
     patient: PatientChecking  # the check on the patient
+    recorder: SessionRecorder | None = None  # of the session; None: it is not kept
 
     def make(self) -> Snapshot:
         """As of now."""
@@ -103,7 +105,7 @@ class SnapshotMaker:
             progress=self._progress(),
             rig_name=rig.name,
             is_simulated=self._is_simulated,
-            is_recording=self.specification.is_recording,
+            is_recording=self._is_recording,
             plan_name=plan.name,
             plan_digest=plan.digest,
             side="" if bone is None or bone.side is None else bone.side,
@@ -179,12 +181,19 @@ class SnapshotMaker:
             "sim:"
         )
 
+    @property
+    def _is_recording(self) -> bool:
+        has_stopped = self.recorder is not None and not self.recorder.is_running
+        return self.specification.is_recording and not has_stopped
+
     def _device_lines(self, reports: tuple[DeviceReport, ...]) -> tuple[DeviceLine, ...]:
         lines = (
             camera_line(self.camera.camera.info, self.camera.trouble, self.camera.silence),
             display_line(self.display.display.info, self.display.trouble),
             *(report.line for report in reports),
         )
+        if self.recorder is not None and (kept := self.recorder.line) is not None:
+            lines = (*lines, kept)
         if self.session.rig_error is None and not self.rig_watch.has_board:
             return lines
         problem = "" if self.session.rig_error is None else self.session.rig_error.problem
