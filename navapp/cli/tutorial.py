@@ -43,6 +43,10 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     """Lead through the steps; left early is no error."""
     if options.step is not None and not 1 <= options.step <= len(STEPS):
         raise UsageError(f"--step {options.step} does not exist", remedy="give 1 to 4")
+    if options.config is not None:
+        raise UsageError(
+            "the tutorial has simulated devices of its own", remedy="leave --config away"
+        )
     check_writable(options.json)
     if not _has_terminal():
         raise UsageError(

@@ -86,9 +86,9 @@ class TutorialFolder:
             )
         try:
             self.path.mkdir(parents=True, exist_ok=True)
-            self.configuration.write_text(_CONFIGURATION, encoding="utf-8")
-            self.board.write_text(json.dumps(_BOARD, indent=1) + "\n", encoding="utf-8")
             if not self._record.is_file():
+                self.configuration.write_text(_CONFIGURATION, encoding="utf-8")
+                self.board.write_text(json.dumps(_BOARD, indent=1) + "\n", encoding="utf-8")
                 self._write(set())
         except OSError as error:
             raise InputError(

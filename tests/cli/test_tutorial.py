@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from navapp.cli import tutorial, tutorial_patient
+from navapp.cli import main, tutorial, tutorial_patient
 from navapp.cli.diagnostics import Diagnostics
 from navapp.cli.main import run
 from navapp.cli.tutorial_folder import TutorialFolder
@@ -16,6 +16,7 @@ from navapp.cli.tutorial_steps import STEPS, Step
 from navapp.errors import DeviceError, InputError, UsageError
 from navapp.preop.contents_file import read_contents
 from navapp.preop.volume import read_ct
+from navapp.ui.tutorial.guide import Guide
 from navapp.values import BoneModel
 from sim_devices.anatomy import make_knee
 
@@ -46,6 +47,11 @@ def test_without_a_terminal_it_says_so_and_makes_nothing(
 def test_there_are_four_steps(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["tutorial", "--out", str(tmp_path / "new"), "--step", "5"]) == 2
     assert "--step 5 does not exist: give 1 to 4" in capsys.readouterr().err
+
+
+def test_it_takes_no_configuration(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["--config", "mine.toml", "tutorial", "--out", str(tmp_path / "new")]) == 2
+    assert "devices of its own: leave --config away" in capsys.readouterr().err
 
 
 @pytest.mark.usefixtures("terminal")
@@ -164,6 +170,45 @@ def test_a_step_that_fails_is_told_and_may_be_done_again(
     assert begun == [1, 1, 2]
     assert told(tmp_path) == [(1, False), (2, False), (3, False), (4, False)]
     assert "navapp: error: no camera" in capsys.readouterr().err
+
+
+def complete(guide: Guide[Any]) -> None:
+    guide._n_reached = guide.n_tasks
+
+
+@pytest.mark.parametrize(
+    ("number", "verbs"),
+    [(1, ["run"]), (2, ["calibrate", "calibrate"]), (3, ["plan"]), (4, ["run"])],
+)
+def test_a_step_runs_its_verbs(
+    number: int, verbs: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = TutorialFolder(tmp_path / "t")
+    folder.begin()
+    folder.ct.write_bytes(b"is there")
+    called: list[str] = []
+
+    def call(arguments: list[str], _: Diagnostics, guide: Guide[Any] | None) -> int:
+        options = main._parser().parse_args(arguments)
+        assert options.config == str(folder.configuration)
+        called.append(options.verb)
+        if guide is not None:
+            complete(guide)
+        return 0
+
+    monkeypatch.setattr(main, "call", call)
+    assert STEPS[number - 1].run(folder, Diagnostics(is_quiet=True))
+    assert called == verbs
+
+
+def test_a_screen_that_is_left_early_is_no_step_that_is_done(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = TutorialFolder(tmp_path / "t")
+    folder.begin()
+    monkeypatch.setattr(main, "call", lambda *_, **__: 0)
+    assert not STEPS[0].run(folder, Diagnostics())
+    assert "left after 0 of 6 things to do" in capsys.readouterr().out
 
 
 def test_the_patient_is_the_one_that_the_cameras_show(
