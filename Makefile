@@ -75,6 +75,14 @@ check: setup    ## style, types, import rules
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+# A command of many lines, of which a filter tells few; it fails as the command does.
+told = { $(1) || touch $(VENV)/.failed; } | $(2); \
+    if test -e $(VENV)/.failed; then rm $(VENV)/.failed; exit 1; fi
+ITSELF := -e '.[test,oak]'
+FEW_OF_UV  := awk '!/^ [-+~] /'
+FEW_OF_PIP := awk '/^Collecting/ && ++n % 20 == 0 { print "  " n " packages looked up" } \
+    /^Installing collected/ { print "  unpacking " NF - 3 " packages" } { fflush() }'
+
 setup: $(STAMP)  ## .venv with pinned packages, kernels compiled
 
 $(STAMP): pyproject.toml constraints.txt
@@ -84,17 +92,21 @@ $(STAMP): pyproject.toml constraints.txt
 	    { echo "a system package is missing; run: make system-deps"; exit 1; }
 	@test -x $(BIN)/python && $(BIN)/python -m pip --version >/dev/null 2>&1 || \
 	    { rm -rf $(VENV); $(PYTHON) -m venv $(VENV); }
-	@echo "installing the pinned packages into $(VENV) (once, some minutes)"
+	@echo "1 of 2: installing the pinned packages into $(VENV) (once, some minutes)"
 ifneq ($(UV),)
-	@$(UV) pip install --quiet --python $(BIN)/python -c constraints.txt -e '.[test,oak]'
+	@$(call told,$(UV) pip install --python $(BIN)/python -c constraints.txt $(ITSELF) 2>&1,$(FEW_OF_UV))
 else
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test,oak]'
+	@$(call told,$(BIN)/python -m pip install --progress-bar off --disable-pip-version-check \
+	    -c constraints.txt $(ITSELF),$(FEW_OF_PIP))
 endif
-	@echo "compiling the kernels (once)"
+	@echo "2 of 2: compiling the kernels (once, some minutes)"
 	@printf '' > $(VENV)/empty.toml
 	@# Until the bone is followed: what is compiled later stops the first session for seconds.
-	@$(BIN)/navapp --quiet --config $(VENV)/empty.toml run --headless --frames 14
-	@$(BIN)/navapp --quiet --config $(VENV)/empty.toml run --headless --mirror --frames 14
+	@echo "  those of the simulated session"
+	@$(BIN)/navapp --config $(VENV)/empty.toml run --headless --frames 14 >/dev/null
+	@echo "  those of the display in the mirror"
+	@$(BIN)/navapp --config $(VENV)/empty.toml run --headless --mirror --frames 14 >/dev/null
+	@echo "  those of pictures in terminals"
 	@$(BIN)/python -c 'from navapp.ui.pictures.graphics import compile_encoders as c; c()'
 	@rm -f $(VENV)/.stamp-* && touch $@
 
