@@ -67,7 +67,7 @@ const build = (direction, into) => {
   const show = () => {
     const slice = direction.slices[range.value];
     said.textContent = `${direction.name}, ${direction.letter} = ${slice.at_mm.toFixed(1)} mm`
-      + ` (LPS), right end: ${direction.towards}`;
+      + ` (LPS); slider right: to the ${direction.towards}`;
     if (slice.jpeg) image.setAttribute("href", "data:image/jpeg;base64," + slice.jpeg);
     image.setAttribute("filter", document.getElementById("soft").checked ? "url(#window)" : "");
     lines.replaceChildren();
