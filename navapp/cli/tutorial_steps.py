@@ -95,10 +95,10 @@ STEPS = (
     Step(
         2,
         "calibrate the rig",
-        "Before cameras can measure, they see a printed board from many sides. A simulated\n"
-        "hand holds it where it is wanted; you see each view being asked for and kept, and\n"
-        "the predicted error fall. Then the rig is solved and judged: it should be\n"
-        "accepted, with a predicted error below 0.3 mm.",
+        "Before cameras can measure, they see a printed board from many sides. A\n"
+        "simulated hand holds it where it is wanted; you see each view being asked for\n"
+        "and kept, and the predicted error fall. Then the rig is solved and judged: it\n"
+        "should be accepted, with a predicted error below 0.3 mm.",
         (),
         _calibrate,
     ),

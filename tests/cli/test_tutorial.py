@@ -91,6 +91,10 @@ def test_a_file_in_place_of_the_folder_is_refused(tmp_path: Path) -> None:
         TutorialFolder(tmp_path / "t").begin()
 
 
+def test_the_words_fit_into_eighty_columns() -> None:
+    assert max(len(line) for step in STEPS for line in step.text.splitlines()) < 80
+
+
 def with_steps(monkeypatch: pytest.MonkeyPatch, **answers: Any) -> list[int]:
     """Steps that answer at once, by number; in the list stands which were begun."""
     begun: list[int] = []
