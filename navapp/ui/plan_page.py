@@ -85,7 +85,7 @@ class PlanPage(PageScreen):
     ]
 
     page_title = "the plan"
-    keys = " back  arrows, SHIFT  TAB turn  n landmark  w window  f facts"
+    keys = " back  arrows scroll  TAB direction  n point  w grey  f facts"
 
     def __init__(self, view: View, walk: SliceWalk) -> None:
         super().__init__(view)

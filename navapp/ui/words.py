@@ -56,6 +56,7 @@ WORDS: tuple[tuple[str, str], ...] = (
     ("known length", "h: of a board in view, as this rig measures it; it shows a moved camera"),
     ("contours here", "i: lines in which the slice cuts the bones, in the bones' colours"),
     ("bar", "i: how long the white line in the slice is"),
+    ("scroll", "i: the arrows, with SHIFT ten slices at a time; 1, 2, 3: a direction"),
     ("LPS", "i: coordinates to the patient's left, back and head, in mm"),
     ("R, L, A, P, H, F", "i: the patient's right, left, front, back, head, feet"),
     ("measured here", "cuts, holes and parts of this stage that are made, against the plan"),

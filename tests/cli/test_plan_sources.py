@@ -8,7 +8,8 @@ import pytest
 import SimpleITK
 
 from navapp.cli.main import run
-from navapp.preop import read_origin, read_plan
+from navapp.preop import read_origin, read_plan, read_plan_view
+from navapp.preop.slices import DIRECTIONS
 
 SPACING_MM = (0.8, 0.8, 1.0)
 TURN = np.array([[0.96, -0.28, 0.0], [0.28, 0.96, 0.0], [0.0, 0.0, 1.0]])
@@ -70,6 +71,20 @@ def test_the_folder_holds_edges_pictures_and_a_summary(planned) -> None:
     assert read_origin(planned).kind == "labels"
 
 
+@pytest.mark.parametrize("direction", DIRECTIONS, ids=lambda one: one.name)
+def test_the_slices_hold_the_labels_where_the_surfaces_are(planned, direction) -> None:
+    """In a volume that is turned about z: beside the contour inside bright, outside black."""
+    view = read_plan_view(planned, read_plan(planned))
+    (index,) = view.grid.find_slices(direction, np.array([CENTRES["femur"]])).tolist()
+    centre = view.grid.find_pixels(direction, np.array(CENTRES["femur"]))
+    ends = view.find_contours(direction, index)["femur"].reshape(-1, 2)
+    away = (ends - centre) / np.linalg.norm(ends - centre, axis=1)[:, None]
+    plane = view.volume.slice_of(direction, index)
+    for offset, expected in ((-2.0, round(255 * 5 / 6)), (2.0, 0)):
+        columns, rows = np.rint(ends + offset * away).astype(int).T
+        assert (plane[rows, columns] == expected).all(), offset
+
+
 def test_programs_are_told_of_the_volume(planned) -> None:
     content = json.loads((planned.parent / "made.json").read_text())
     assert content["ct"]["spacing_mm"] == pytest.approx(SPACING_MM)
@@ -84,7 +99,7 @@ def test_a_plan_is_shown(planned, capsys) -> None:
     assert "femur: " in shown
 
 
-@pytest.mark.parametrize("file", ["aspects_femur.npz", "plan.json"])
+@pytest.mark.parametrize("file", ["aspects_femur.npz", "slices.npz", "plan.json"])
 def test_an_edited_file_is_noticed(planned, tmp_path, file, capsys) -> None:
     copy = tmp_path / "plan"
     copy.mkdir()
