@@ -65,10 +65,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     _show_list(folder, diagnostics)
     done = folder.read_done()
     if len(done) == len(STEPS):
-        diagnostics.say(
-            "\nThat was the tutorial. Next: docs/README.md, and `navapp run --mirror` for the "
-            "display in the mirror."
-        )
+        diagnostics.say("\nThat was the tutorial. Next: docs/README.md, and `navapp run --mirror`.")
     steps = [
         {"number": s.number, "title": s.title, "done": s.number in done,
          "seconds": seconds.get(s.number)}

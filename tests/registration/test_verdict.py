@@ -168,7 +168,7 @@ def test_what_the_judge_may_say_is_all_in_the_table() -> None:
     others = {reason for reason in Reason if reason not in REASONS}
     assert {reason.name for reason in others} == {
         "NOT_NAVIGATING", "BLANKED", "CAMERA_SILENT", "DEVICE_FAULT", "RIG_MOVED", "MIRROR_AWAY",
-        "PROJECTOR_ALTERS", "PROJECTOR_LOST", "POSE_TOO_OLD", "STAGE_WITHOUT_BONE",
+        "PROJECTOR_ALTERS", "PROJECTOR_LOST", "POSE_TOO_OLD", "TOO_SLOW", "STAGE_WITHOUT_BONE",
         "DISPLAY_DIFFERS", "DISPLAY_NOT_ACCEPTED", "DISPLAY_EXPIRED", "MOVES_TOO_FAST",
         "OTHER_EYE", "MIRROR_INEXACT", "MIRROR_UNCHECKED", "MIRROR_CHECK_FAILED",
         "MIRROR_CHECK_OLD", "CHECK_FAILED", "TIME_OUT_OPEN",
