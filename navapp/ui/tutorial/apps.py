@@ -2,16 +2,32 @@
 
 from typing import Any
 
+from textual.screen import Screen
+
 from navapp.control.capture.states import CaptureSnapshot
 from navapp.control.states import Snapshot
 from navapp.ui.app import NavigationApp
-from navapp.ui.capture.app import CaptureApp, CaptureSession
+from navapp.ui.capture.app import CaptureApp, CaptureScreen, CaptureSession
+from navapp.ui.main_screen import MainScreen
 from navapp.ui.session import Session
 from navapp.ui.symbols import Symbols
 from navapp.ui.tutorial.guide import Guide
 from navapp.ui.tutorial.lines import TutorialCaptureLines, TutorialLines
+from navapp.ui.view import View
 
 _CSS = "#tutorial { height: 3; background: $panel; }"
+
+
+class TutorialScreen(MainScreen):
+    """The main screen with the guide's lines."""
+
+    def __init__(self, guide: Guide[Snapshot], view: View) -> None:
+        super().__init__(view)
+        self._guide = guide
+
+    def on_mount(self) -> None:
+        """Put the lines above the picture."""
+        self.query_one("#body").mount(TutorialLines(self._guide), before="#middle")
 
 
 class TutorialApp(NavigationApp):
@@ -23,18 +39,26 @@ class TutorialApp(NavigationApp):
         super().__init__(session, title, **how)
         self._guide = guide
 
-    def on_mount(self) -> None:
-        """Put the lines above the picture, once that is there."""
-        self.call_after_refresh(self._add_lines)
-
-    def _add_lines(self) -> None:
-        body = self.screen_stack[0].query_one("#body")
-        body.mount(TutorialLines(self._guide), before="#middle")
+    def get_default_screen(self) -> Screen[None]:
+        """The main screen."""
+        return TutorialScreen(self._guide, self._view)
 
     def poll(self) -> None:
         """Tick what is reached, then show it."""
         self._guide.observe(self._session.snapshot())
         super().poll()
+
+
+class TutorialCaptureScreen(CaptureScreen):
+    """The screen of a capture with the guide's lines."""
+
+    def __init__(self, guide: Guide[CaptureSnapshot]) -> None:
+        super().__init__()
+        self._guide = guide
+
+    def on_mount(self) -> None:
+        """Put the lines above the pictures."""
+        self.query_one("#body").mount(TutorialCaptureLines(self._guide), before="#pictures")
 
 
 class TutorialCaptureApp(CaptureApp):
@@ -43,18 +67,16 @@ class TutorialCaptureApp(CaptureApp):
     CSS = _CSS
 
     def __init__(
-        self, guide: Guide[CaptureSnapshot], session: CaptureSession, *, symbols: Symbols
+        self,
+        guide: Guide[CaptureSnapshot],
+        session: CaptureSession,
+        *,
+        symbols: Symbols,
+        **how: Any,
     ) -> None:
-        super().__init__(session, symbols=symbols)
+        super().__init__(session, symbols=symbols, **how)
         self._guide = guide
-
-    def on_mount(self) -> None:
-        """Put the lines above the pictures, once those are there."""
-        self.call_after_refresh(self._add_lines)
-
-    def _add_lines(self) -> None:
-        body = self.screen_stack[0].query_one("#body")
-        body.mount(TutorialCaptureLines(self._guide), before="#pictures")
+        self._guided_screen = TutorialCaptureScreen(guide)
 
     def poll(self) -> None:
         """Tick what is reached, then show it."""

@@ -60,7 +60,7 @@ def test_the_lines_tell_what_to_do_and_tick_what_is_reached() -> None:
 
 def test_the_capture_has_them_too() -> None:
     guide = make_capture_guide()
-    app = TutorialCaptureApp(guide, FixedCapture(), symbols=UNICODE)
+    app = TutorialCaptureApp(guide, FixedCapture(), symbols=UNICODE, polls_per_s=0)
 
     async def run() -> tuple[str, int]:
         async with app.run_test(size=(80, 24)) as pilot:
