@@ -23,6 +23,7 @@ _VERBS = (
     "register",
     "calibrate",
     "accuracy-test",
+    "evaluate",
     "rig",
     "devices",
     "doctor",

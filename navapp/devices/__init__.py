@@ -5,7 +5,12 @@ from navapp.devices.capture import OpenedCapture, open_capture
 from navapp.devices.latency import OpenedLatency, open_latency
 from navapp.devices.mirror_alignment import OpenedAlignment, open_mirror_alignment
 from navapp.devices.peripherals import read_display_name, read_projector
-from navapp.devices.session_devices import OpenedDevices, open_live, open_recording
+from navapp.devices.session_devices import (
+    OpenedDevices,
+    make_memory_devices,
+    open_live,
+    open_recording,
+)
 from navapp.devices.simulated_mirror import make_practice_display
 from navapp.devices.simulated_patient import SimulatedPatient, make_simulated_patient
 from navapp.devices.simulated_room import Simulation
@@ -17,6 +22,7 @@ __all__ = [
     "OpenedLatency",
     "SimulatedPatient",
     "Simulation",
+    "make_memory_devices",
     "make_practice_display",
     "make_real_camera",
     "make_simulated_patient",

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from calibration.targets.boards import Board
 from drivers.clock import Clock, ManualClock, SystemClock
 from drivers.interfaces import DeviceSet, StereoCamera
+from drivers.memory_camera import MemoryCamera
 from drivers.replay_camera import ReplayCamera, ReplaySettings
 from navapp.config import Configuration
 from navapp.devices.cameras import make_real_camera
@@ -125,3 +126,11 @@ def _open_devices(
 
 def _no_reopening() -> StereoCamera:
     raise DeviceError("a recording cannot be reopened")
+
+
+def make_memory_devices(
+    camera: MemoryCamera, clock: Clock, rig: StereoRig, configuration: Configuration
+) -> DeviceSet:
+    """The devices of a stepped session on frames in memory; nothing real is lit or moved."""
+    camera.open()
+    return make_device_set(configuration, camera, clock, rig, is_live=False)

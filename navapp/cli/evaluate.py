@@ -1,0 +1,125 @@
+"""`navapp evaluate`: the paper's tables on simulated knees, with three methods."""
+
+import argparse
+import os
+from typing import TYPE_CHECKING, Any
+
+from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
+from navapp.errors import UsageError
+
+if TYPE_CHECKING:
+    from navapp.evaluation.campaign import CampaignSettings
+
+_EXAMPLE = """\
+examples:
+  navapp evaluate --quick --out look/            every case, one test of 5 frames: some minutes
+  navapp evaluate --out tables/                  all of it: about two hours on two cores
+  navapp evaluate --stages opening --methods bimcc --tests 2 --out opening/
+
+3 samples x 5 stages x 4 situations x 3 methods, 5 tests each, every test another simulated knee,
+registered once and then followed. The folder gets tables.md, report.html, evaluate.json and
+frames.csv. Killed in the middle and started again with the same options, it goes on.
+"""
+_FRAMES, _QUICK_FRAMES = 40, 5
+
+
+def add_parser(subparsers: Any) -> None:
+    """Declare the verb."""
+    parser = subparsers.add_parser(
+        "evaluate",
+        help="the paper's tables: every stage and situation, three methods side by side",
+        epilog=_EXAMPLE,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    # The words, so that --help needs no heavy import; a test holds them against the tables.
+    chosen = (
+        ("--samples", "samples", ("man", "woman", "adult")),
+        ("--stages", "stages", ("opening", "drilling", "implant", "patella", "spacer")),
+        ("--situations", "situations", ("registration", "overlay", "patient", "instrument")),
+        ("--methods", "methods", ("icp", "paper", "bimcc")),
+    )
+    for option, what, names in chosen:
+        parser.add_argument(
+            option, nargs="+", choices=names, default=list(names), help=f"{what} (all)"
+        )
+    parser.add_argument("--tests", type=int, default=5, metavar="N", help="of each case (5)")
+    parser.add_argument(
+        "--frames", type=int, default=_FRAMES, metavar="N", help=f"of each test ({_FRAMES})"
+    )
+    parser.add_argument("--seed", type=int, metavar="N", help="of the first knee")
+    parser.add_argument(
+        "--quick", action="store_true", help="one test of 5 frames of each case: no results"
+    )
+    parser.add_argument(
+        "--processes", type=int, metavar="N", help="at a time (the computer's cores, at most 4)"
+    )
+    parser.add_argument("--out", metavar="DIR", required=True, help="folder for the results")
+    parser.add_argument("--json", metavar="FILE", help="result for programs (- is stdout)")
+
+
+def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
+    """Do it; the exit code."""
+    from navapp.evaluation.campaign import CampaignFolder, run_campaign
+    from navapp.evaluation.results import write_results
+
+    check_writable(options.json)
+    settings = _read_settings(options)
+    n_processes = options.processes or min(4, os.cpu_count() or 1)
+    folder = CampaignFolder(options.out, settings)
+    diagnostics.note(f"{len(settings.tests)} tests, {n_processes} at a time, into {options.out}")
+
+    def tell(n_done: int, n_all: int, name: str) -> None:
+        diagnostics.progress("evaluating", n_done / n_all)
+        diagnostics.detail(f"{n_done} of {n_all}: {name}")
+
+    run_campaign(folder, settings, n_processes, tell)
+    content = write_results(folder, settings)
+    write_json(str(folder.path / "evaluate.json"), "evaluate", content)
+    write_json(options.json, "evaluate", content)
+    if options.json != "-":
+        _say(content["summary"], options.out, diagnostics)
+    return 0
+
+
+def _read_settings(options: argparse.Namespace) -> "CampaignSettings":
+    from navapp.evaluation.campaign import CampaignSettings
+    from navapp.evaluation.cases import ALL_CASES, FIRST_SEED, METHODS, MOST_TESTS
+
+    n_tests, n_frames = options.tests, options.frames
+    if options.quick:
+        n_tests, n_frames = 1, _QUICK_FRAMES
+    if not 1 <= n_tests <= MOST_TESTS:
+        raise UsageError(f"--tests must be from 1 to {MOST_TESTS}")
+    if n_frames < 1:
+        raise UsageError("--frames must be at least 1")
+    if options.processes is not None and options.processes < 1:
+        raise UsageError("--processes must be at least 1")
+    seed = FIRST_SEED if options.seed is None else options.seed
+    if seed < 0:
+        raise UsageError("--seed must not be negative")
+    cases = tuple(
+        case
+        for case in ALL_CASES
+        if case.sample in options.samples
+        and case.stage in options.stages
+        and case.situation in options.situations
+    )
+    methods = tuple(name for name in METHODS if name in options.methods)
+    return CampaignSettings(cases, methods, n_tests, n_frames, seed, options.quick)
+
+
+def _say(summary: dict[str, Any], out: str, diagnostics: Diagnostics) -> None:
+    if summary["quick"]:
+        diagnostics.say("a quick look, no results: one short test of each case")
+    for method, one in summary["judged"].items():
+        diagnostics.say(
+            f"{method}: {one['ok']} of {one['frames']} frames OK, {one['wrong_and_ok']} of them "
+            "wrong beyond their bound"
+        )
+    beside = summary["beside_the_paper"]
+    if beside["cases"]:
+        diagnostics.say(
+            f"bimcc beside the paper's own figures: nearer in {beside['nearer']}, faster in "
+            f"{beside['faster']} of {beside['cases']} cases"
+        )
+    diagnostics.say(f"tables, report and all frames: {out}")

@@ -1,0 +1,167 @@
+"""One method on one sequence: registered once, then followed, and judged against the truth."""
+
+import time
+from contextlib import ExitStack
+from dataclasses import dataclass
+
+from drivers.clock import ManualClock
+from drivers.memory_camera import MemoryCamera
+from navapp.control.commands import Accept, Command, Register, Reject
+from navapp.control.controller import SessionController
+from navapp.control.event_log import SessionHooks
+from navapp.control.executors import InlineExecutor
+from navapp.control.frame_result import FrameResult
+from navapp.control.runner import run_headless
+from navapp.control.specification import specify_session
+from navapp.control.states import SessionState, Snapshot
+from navapp.devices import make_memory_devices
+from navapp.evaluation.overlay_error import measure_overlay_error
+from navapp.evaluation.scores import Followed, FrameScore
+from navapp.evaluation.sequence import KnownSequence
+from navapp.evaluation.truth import compute_mean_tre_mm
+from navapp.geometry.mesh import TriangleMesh
+from navapp.geometry.rectification import rectifier_of
+from navapp.geometry.transform import RigidTransform
+from navapp.tracking import Method
+from navapp.values import Status
+
+# A bone that so many searches have not found is not searched for any more.
+_MOST_REGISTRATIONS = 5
+
+
+class Follower:
+    """The operator of a test: registers, accepts what is found, and does nothing more.
+
+    What the judge calls lost is rejected and searched for again in the next frame; with
+    `follows_refused` it is left under review and followed, and never accepted.
+    """
+
+    def __init__(self, *, follows_refused: bool) -> None:
+        self._follows_refused = follows_refused
+        self.n_registrations = 0
+
+    def commands(self, snapshot: Snapshot) -> list[Command]:
+        """What to do now."""
+        if snapshot.state in (SessionState.STARTING, SessionState.READY):
+            if self.n_registrations == _MOST_REGISTRATIONS:
+                return []
+            self.n_registrations += 1
+            return [Register()]
+        if snapshot.state is not SessionState.REVIEW:
+            return []
+        is_lost = snapshot.verdict is None or snapshot.verdict.status is Status.LOST
+        if is_lost and self._follows_refused:
+            return []
+        return [(Reject if is_lost else Accept)(snapshot.candidate_id)]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Answers:
+    """What a method said of a sequence."""
+
+    followed: Followed
+    poses: tuple[RigidTransform | None, ...]  # left camera from bone, of every frame
+    surface: TriangleMesh  # of the bone, as it is drawn
+
+
+def follow(sequence: KnownSequence, method: Method) -> Answers:
+    """Register the bone in the first frame, and follow it to the last one.
+
+    The paper's two methods carry on what our judge refuses, so that they can be measured; its word
+    on them is kept.
+    """
+    follows_refused = method != "bimcc"
+    operator = Follower(follows_refused=follows_refused)
+    judge = _Judge(sequence, operator)
+    clock = ManualClock()
+    specification = specify_session(
+        sequence.configuration,
+        sequence.rig,
+        sequence.plan,
+        sequence.prior,
+        sequence.stage,
+        is_live=False,
+        method=method,
+        follows_refused=follows_refused,
+        made_steps=sequence.made_steps,
+    )
+    with ExitStack() as undo:
+        camera = MemoryCamera(sequence.frames, clock, is_simulated=sequence.is_simulated)
+        devices = make_memory_devices(camera, clock, sequence.rig, sequence.configuration)
+        controller = SessionController(
+            devices,
+            specification,
+            executor=InlineExecutor(),
+            hooks=SessionHooks(on_frame=(judge.take,)),
+        )
+        undo.callback(controller.close)
+        judge.surface = controller.snapshot.bone_surface or judge.surface
+        started_s = time.perf_counter()
+        run_headless(controller, operator)
+    return judge.result(started_s)
+
+
+class _Judge:
+    """Scores frames as they come; the sequence's truth goes no further."""
+
+    def __init__(self, sequence: KnownSequence, operator: Follower) -> None:
+        self._sequence, self._operator = sequence, operator
+        self._n_searches = 0  # that were made before the newest frame
+        self._bone = sequence.plan.bones[sequence.stage.bone]
+        self._targets_mm = sequence.plan.targets_of(sequence.stage.targets)
+        self._geometry = rectifier_of(sequence.rig).geometry
+        self._scores: list[FrameScore] = []
+        self._poses: list[RigidTransform | None] = []
+        self._registered_s: float | None = None
+        self._spent_s = 0.0  # in judging
+        self.surface: TriangleMesh = self._bone.mesh  # what is left of the bone
+
+    def take(self, result: FrameResult) -> None:
+        """A frame was handled."""
+        started_s = time.perf_counter()
+        tracked = result.tracked
+        pose = None if tracked is None else tracked.left_from_bone
+        if pose is not None and self._registered_s is None:
+            self._registered_s = started_s - self._spent_s
+        self._poses.append(pose)
+        is_search = self._operator.n_registrations > self._n_searches
+        self._n_searches = self._operator.n_registrations
+        self._scores.append(self._score(result, is_search=is_search))
+        self._spent_s += time.perf_counter() - started_s
+
+    def result(self, started_s: float) -> Answers:
+        """Scores of all frames but the one in which the first search was made."""
+        registered_s = self._registered_s
+        seconds = None if registered_s is None else registered_s - started_s
+        followed = Followed(seconds, self._n_searches, tuple(self._scores[1:]))
+        return Answers(followed, tuple(self._poses), self.surface)
+
+    def _score(self, result: FrameResult, *, is_search: bool) -> FrameScore:
+        place, tracked = len(self._scores), result.tracked
+        verdict = None if tracked is None else tracked.verdict
+        pose = None if tracked is None else tracked.left_from_bone
+        tre_mm, displacement_mm, outline_mm = self._measure(pose, self._sequence.truth[place])
+        return FrameScore(
+            index=place,
+            status=Status.LOST.value if verdict is None else verdict.status.value,
+            reasons=() if verdict is None else tuple(one.value for one in verdict.reasons),
+            tre_mm=tre_mm,
+            displacement_mm=displacement_mm,
+            outline_mm=outline_mm,
+            bound_mm=None if verdict is None else verdict.predicted_tre_mm,
+            seen=None if verdict is None else verdict.coverage,
+            hidden=None if verdict is None else verdict.occluded_fraction,
+            total_ms=result.timings.total_ms,
+            is_search=is_search,
+        )
+
+    def _measure(
+        self, pose: RigidTransform | None, true: RigidTransform | None
+    ) -> tuple[float | None, float | None, float | None]:
+        if pose is None or true is None:
+            return None, None, None
+        tre_mm = compute_mean_tre_mm(pose, true, self._bone, self._targets_mm)
+        drawn = measure_overlay_error(pose, true, self.surface, self._geometry)
+        if drawn is None:
+            return tre_mm, None, None
+        return tre_mm, drawn.displacement_mm, drawn.outline_mm

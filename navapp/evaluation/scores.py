@@ -1,0 +1,73 @@
+"""A frame that was judged against the truth, and its place in files."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+from typing import Any
+
+
+@dataclass(frozen=True, slots=True)
+class FrameScore:
+    """What a method said of one frame, beside where the bone really was."""
+
+    index: int  # of the frame in its sequence
+    status: str  # the judge's word
+    reasons: tuple[str, ...]
+    tre_mm: float | None  # mean over the stage's targets; None without a pose or truth
+    # displacement_mm, outline_mm: of the drawn bone (`overlay_error`); None as well.
+    displacement_mm: float | None
+    outline_mm: float | None
+    bound_mm: float | None  # that the judge predicts for `tre_mm`, 95 %
+    seen: float | None  # share of the bone's side towards the camera that agrees
+    hidden: float | None  # share of it that something hides
+    total_ms: float  # that the frame took, from rectification to overlay
+    is_search: bool = False  # a registration was made in it
+
+    @property
+    def is_ok(self) -> bool:
+        """The judge believes it."""
+        return self.status == "OK"
+
+    def to_json(self) -> dict[str, Any]:
+        """Named values."""
+        return asdict(self)
+
+    @classmethod
+    def from_json(cls, content: Mapping[str, Any]) -> "FrameScore":
+        """Of such an object.
+
+        Raises:
+            KeyError, TypeError: it is none.
+        """
+        values = {one.name: content[one.name] for one in fields(cls)}
+        return cls(**{**values, "reasons": tuple(values["reasons"])})
+
+
+@dataclass(frozen=True, slots=True)
+class Followed:
+    """What a method made of a sequence."""
+
+    # of the first registration that left a pose, with those that failed before; None: none did.
+    registration_s: float | None
+    n_registrations: int  # searches that were made
+    frames: tuple[FrameScore, ...]  # after the frame of the first search
+
+    def to_json(self) -> dict[str, Any]:
+        """Named values."""
+        return {
+            "registration_s": self.registration_s,
+            "n_registrations": self.n_registrations,
+            "frames": [frame.to_json() for frame in self.frames],
+        }
+
+    @classmethod
+    def from_json(cls, content: Mapping[str, Any]) -> "Followed":
+        """Of such an object.
+
+        Raises:
+            KeyError, TypeError: it is none.
+        """
+        return cls(
+            content["registration_s"],
+            content["n_registrations"],
+            tuple(FrameScore.from_json(one) for one in content["frames"]),
+        )
