@@ -26,6 +26,7 @@ from navapp.control.commands import (
     Reconnect,
     Register,
     Reject,
+    SetProjector,
     Show,
     ToggleDepth,
     ToggleEye,
@@ -56,13 +57,16 @@ _PLAIN: dict[str, type] = {
 # Older recordings do not say which candidate was meant: the one that was under review.
 _DECISIONS: dict[str, type[Accept] | type[Reject]] = {"accept": Accept, "reject": Reject}
 # Commands about something that has a name.
-_Named = ToggleLayer | ConfirmStep | WithdrawStep | ConfirmCondition | WithdrawCondition
+_Named = (
+    ToggleLayer | ConfirmStep | WithdrawStep | ConfirmCondition | WithdrawCondition | SetProjector
+)
 _NAMED: dict[str, type[_Named]] = {
     "layer": ToggleLayer,
     "confirm_step": ConfirmStep,
     "withdraw_step": WithdrawStep,
     "confirm": ConfirmCondition,
     "withdraw": WithdrawCondition,
+    "projector": SetProjector,
 }
 # What recordings before holes and parts call them.
 _READ_NAMED = {**_NAMED, "confirm_cut": ConfirmStep, "withdraw_cut": WithdrawStep}

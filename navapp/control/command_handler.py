@@ -2,6 +2,7 @@
 
 from navapp.control.camera_link import CameraLink
 from navapp.control.commands import (
+    PROJECTOR_SETTINGS,
     Accept,
     Blank,
     Cancel,
@@ -24,6 +25,7 @@ from navapp.control.commands import (
     Reconnect,
     Register,
     Reject,
+    SetProjector,
     Show,
     ToggleDepth,
     ToggleEye,
@@ -63,6 +65,7 @@ _NAMES: dict[type[Command], str] = {
     EnterStage: "stage",
     OverrideGate: "override",
     Reconnect: "reopen",
+    SetProjector: "projector",
     DistrustRig: "rig",
 }
 
@@ -139,6 +142,9 @@ class CommandHandler:
                 session.add_event("reopen", "lost devices are opened again")
                 self._camera.retry_now()
                 self._monitored.restore()
+            case SetProjector():
+                session.add_event("projector", f"projector: {PROJECTOR_SETTINGS[command.name]}")
+                self._monitored.set_projector(command.name)
             case Interrupt():
                 session.forget_sight()
                 session.fall_back("the camera was lost here when this was recorded")

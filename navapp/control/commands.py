@@ -173,6 +173,23 @@ class Reconnect:
     """Open lost devices again and bring the mirror to its place, now."""
 
 
+# What a projector can be told by its name, and what that is called. Its source and its flips are
+# those that the session needs: with others nothing is shown.
+PROJECTOR_SETTINGS = {
+    "on": "power on",
+    "off": "power off",
+    "source": "source as before",
+    "flips": "flips as calibrated",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class SetProjector:
+    """Tell the projector one of its settings."""
+
+    name: str  # of the setting
+
+
 @dataclass(frozen=True, slots=True)
 class Interrupt:
     """The camera was lost at this point of a recorded session: forget what it was looking at."""
@@ -216,6 +233,7 @@ Command = (
     | DropPoint
     | ForgetPoints
     | Reconnect
+    | SetProjector
     | Interrupt
     | DistrustRig
     | Quit

@@ -188,6 +188,7 @@ class SessionController:
             frame = self._next_frame(timeout_s)
             if frame is not None:
                 self._handle_frame(frame)
+        self._monitored.tell_answers(session)
         before, self._snapshot = self._snapshot, self._make_snapshot()
         if self._snapshot.device_reasons:
             self._display.darken()

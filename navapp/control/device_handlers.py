@@ -3,9 +3,15 @@
 from dataclasses import dataclass
 from typing import Protocol
 
-from drivers.interfaces import MirrorMount, PowerState, ProjectorControl, ProjectorStatus
+from drivers.interfaces import (
+    CommandResult,
+    MirrorMount,
+    PowerState,
+    ProjectorControl,
+    ProjectorStatus,
+)
 from navapp.control.states import DeviceHealth, DeviceLine
-from navapp.errors import DeviceError
+from navapp.errors import DeviceError, UnsupportedControl
 from navapp.geometry.display_model import DisplayModel
 from navapp.values import Reason
 
@@ -14,6 +20,15 @@ from navapp.values import Reason
 MIRROR_TOLERANCE_DEG = 0.028
 _MOTION_S = 60.0
 _NO_KEYSTONE = (0, 0)
+# A lamp takes longer: that it is there is seen in the reports, and none may become stale.
+_COMMAND_S = 10.0
+_ALTERED = "f sets its flips, s its source; set keystone and freeze back on the projector"
+_NOT_CONFIGURED = "name its backend under [projector], or calibrate the display without it"
+_RESULTS = {
+    CommandResult.ACCEPTED: "accepted, its state tells when it is so",
+    CommandResult.FINISHED: "done, as far as it can be told",
+    CommandResult.VERIFIED: "done",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,19 +106,40 @@ class ProjectorHandler:
         self.is_slow = status.power is not PowerState.ABSENT
         if status.power is PowerState.ABSENT and self._flips is not None:
             detail = "not configured, but the display was calibrated with it"
-            line = DeviceLine("projector", name, DeviceHealth.TROUBLE, detail)
+            line = DeviceLine("projector", name, DeviceHealth.TROUBLE, detail, _NOT_CONFIGURED)
             return DeviceReport(line, self.reason)
         if status.power is PowerState.ABSENT:
             return DeviceReport(DeviceLine("projector", name, DeviceHealth.ABSENT, "not used"))
         if changes := self._changes(status):
-            line = DeviceLine("projector", name, DeviceHealth.TROUBLE, f"picture {changes}")
+            detail = f"picture {changes}"
+            line = DeviceLine("projector", name, DeviceHealth.TROUBLE, detail, _ALTERED)
             return DeviceReport(line, Reason.PROJECTOR_ALTERS)
         is_on = status.power is PowerState.ON
         dark = () if is_on else (status.power.value,)
         if told := (*dark, *(("muted",) if status.is_muted else ()), *status.faults):
-            line = DeviceLine("projector", name, DeviceHealth.TROUBLE, ", ".join(told))
+            detail, remedy = ", ".join(told), _find_remedy(status)
+            line = DeviceLine("projector", name, DeviceHealth.TROUBLE, detail, remedy)
             return DeviceReport(line, self.reason if status.power is PowerState.FAULT else None)
         return DeviceReport(DeviceLine("projector", name, DeviceHealth.OK, status.power.value))
+
+    def set(self, name: str) -> str:
+        """Tell it one of `PROJECTOR_SETTINGS`; what became of it, in words.
+
+        Raises:
+            DeviceError: it cannot, or does not answer.
+        """
+        if name in ("on", "off"):
+            return _RESULTS[self._projector.set_power(name == "on", _COMMAND_S)]
+        if name == "flips":
+            flips = self._flips or (False, False)
+            return _RESULTS[self._projector.set_flips(*flips, _COMMAND_S)]
+        if self._source is None:
+            raise UnsupportedControl(
+                "it has not told its source in this session",
+                subject="projector",
+                remedy="switch it on, and choose the source on it",
+            )
+        return _RESULTS[self._projector.set_source(self._source, _COMMAND_S)]
 
     def restore(self) -> None:
         """Its picture is set on the projector, by a person who sees it."""
@@ -133,6 +169,18 @@ class ProjectorHandler:
         """Otherwise than calibrated, or at all where no flip was calibrated."""
         found = (bool(status.flips_horizontally), bool(status.flips_vertically))
         return found != (self._flips or (False, False))
+
+
+def _find_remedy(status: ProjectorStatus) -> str:
+    """What helps a projector that shows nothing."""
+    if status.faults or status.power is PowerState.FAULT:
+        return "see its own lamps and its manual"
+    return {
+        PowerState.STANDBY: "p switches it on",
+        PowerState.WARMING: "wait until its lamp is warm",
+        PowerState.COOLING: "wait until its lamp is cold, then p switches it on",
+        PowerState.ON: "end its mute on the projector",
+    }.get(status.power, "")
 
 
 class MirrorHandler:

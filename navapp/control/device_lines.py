@@ -1,8 +1,11 @@
 """What the devices panel says of camera, display and rig."""
 
+from dataclasses import replace
+
 from drivers.interfaces import CameraInfo, DisplayInfo
 from navapp.control.length_check import Finding, LengthCheck
 from navapp.control.states import DeviceHealth, DeviceLine
+from navapp.values import Reason
 
 # What is not known is no good news.
 _FINDINGS = {
@@ -11,6 +14,24 @@ _FINDINGS = {
     Finding.WITHIN: DeviceHealth.OK,
     Finding.NOT_JUDGED: DeviceHealth.UNKNOWN,
 }
+
+
+# What helps a device in trouble that names nothing better itself.
+_REMEDIES = {
+    "camera": f"{Reason.CAMERA_SILENT.remedy}; it is opened again by itself, at once with o",
+    "display": "check its cable and its mains; it is opened again by itself",
+    "projector": f"{Reason.PROJECTOR_LOST.remedy}; it is opened again by itself, at once with o",
+    "mirror": "o brings it back to its place; keep hands off meanwhile",
+    "rig": Reason.RIG_MOVED.remedy,
+    "recording": "free room on that disc; what is kept so far can be replayed",
+}
+
+
+def with_remedy(line: DeviceLine) -> DeviceLine:
+    """The line of a device in trouble says what to do."""
+    if line.remedy or line.health not in (DeviceHealth.TROUBLE, DeviceHealth.LOST):
+        return line
+    return replace(line, remedy=_REMEDIES.get(line.kind, ""))
 
 
 def camera_line(info: CameraInfo, trouble: str, silence: str) -> DeviceLine:

@@ -2,9 +2,12 @@
 
 import threading
 import time
+from collections import deque
+from collections.abc import Callable
 
 from drivers.clock import Clock, SystemClock
 from navapp.control.backoff import Backoff
+from navapp.control.commands import PROJECTOR_SETTINGS
 from navapp.control.device_handlers import (
     DeviceHandler,
     DeviceReport,
@@ -27,6 +30,8 @@ PROJECTOR_TIMES_S = (3.0, 20.0)
 _PAUSES_S = (1.0, 8.0)
 # A projector takes 9 s to be found silent.
 _LONGEST_END_S, _STOP_PERIOD_S = 20.0, 0.1
+
+Deed = Callable[[], str]
 
 _FAILED = (DeviceHealth.TROUBLE, DeviceHealth.LOST)
 
@@ -55,6 +60,8 @@ class DeviceMonitor:
         self._wake = threading.Event()
         self._is_over = False
         self._n_asked = self._n_restored = 0
+        self._deeds: deque[tuple[str, Deed]] = deque()
+        self._answers: deque[tuple[str, EventLevel]] = deque()
         self._made = (self._clock.now_ns(), handler.report())
         self._thread: threading.Thread | None = None
         if handler.is_slow:
@@ -78,6 +85,32 @@ class DeviceMonitor:
         """Open it if it is lost, and bring it to its place: now, without the pause."""
         self._n_asked += 1
         self._wake.set()
+
+    def do(self, what: str, deed: Deed) -> None:
+        """Have something done between two questions; `pop_answers` tells what became of it."""
+        self._deeds.append((what, deed))
+        if self._thread is None:
+            self._do_deeds()
+        self._wake.set()
+
+    def pop_answers(self) -> list[tuple[str, EventLevel]]:
+        """What became of deeds, each once."""
+        return [self._answers.popleft() for _ in range(len(self._answers))]
+
+    def _do_deeds(self) -> None:
+        while self._deeds:
+            what, deed = self._deeds.popleft()
+            try:
+                self._answers.append((f"{what}: {deed()}", EventLevel.INFO))
+            except DeviceError as error:
+                self._answers.append((f"{what} failed: {error}", EventLevel.WARNING))
+
+    def _lose(self, report: DeviceReport, why: str) -> DeviceReport:
+        """What was asked of a device that is lost must not happen minutes later."""
+        while self._deeds:
+            what, _ = self._deeds.popleft()
+            self._answers.append((f"{what} failed: it is not there", EventLevel.WARNING))
+        return self._with(report, DeviceHealth.LOST, why)
 
     @property
     def _is_restoring(self) -> bool:
@@ -115,11 +148,12 @@ class DeviceMonitor:
                 self._handler.reopen()
             if self._is_restoring:
                 self._handler.restore()
+            self._do_deeds()
             return self._handler.report()
         except DeviceError as error:
-            return self._with(report, DeviceHealth.LOST, str(error))
+            return self._lose(report, str(error))
         except Exception as error:  # noqa: BLE001 (a bug must end as a lost device, not as a silent thread)
-            return self._with(report, DeviceHealth.LOST, f"failed: {error!r}")
+            return self._lose(report, f"failed: {error!r}")
         finally:
             self._n_restored = n_asked
 
@@ -135,6 +169,7 @@ class MonitoredDevices:
     """
 
     def __init__(self, projector: ProjectorHandler, mirror: MirrorHandler) -> None:
+        self._projector = projector
         self._watches = (
             DeviceMonitor(projector, PROJECTOR_TIMES_S),
             DeviceMonitor(mirror, MIRROR_TIMES_S),
@@ -150,6 +185,16 @@ class MonitoredDevices:
         """Open what is lost and bring the mirror to its place, now."""
         for watch in self._watches:
             watch.restore()
+
+    def set_projector(self, name: str) -> None:
+        """Have one of `PROJECTOR_SETTINGS` told to the projector."""
+        what = f"projector, {PROJECTOR_SETTINGS[name]}"
+        self._watches[0].do(what, lambda: self._projector.set(name))
+
+    def tell_answers(self, session: Session) -> None:
+        """What became of it, as events."""
+        for text, level in self._watches[0].pop_answers():
+            session.add_event("projector", text, level)
 
     def close(self) -> None:
         """End all watching, the mirror's first: it may move; the devices stay open."""

@@ -5,6 +5,7 @@ cut, is the gate met) is refused by them, in the same words to the operator.
 """
 
 from navapp.control.commands import (
+    PROJECTOR_SETTINGS,
     Accept,
     Cancel,
     CheckMirror,
@@ -19,6 +20,7 @@ from navapp.control.commands import (
     Reconnect,
     Register,
     Reject,
+    SetProjector,
     Show,
     ToggleEye,
     ToggleLayer,
@@ -55,6 +57,8 @@ def why_refused(command: Command, snapshot: Snapshot) -> str:
             return "the rig is known to have moved"
         case Reconnect() if not _has_failed_device(snapshot):
             return "no device is lost or in trouble"
+        case SetProjector():
+            return _why_not_told(command, snapshot)
     return ""
 
 
@@ -116,6 +120,17 @@ def _why_not_enter(command: EnterStage | OverrideGate, snapshot: Snapshot) -> st
             return f"enter stage {command.number} first, and read what is open"
         if not command.reason.strip():
             return "a gate is overridden with a reason only"
+    return ""
+
+
+def _why_not_told(command: SetProjector, snapshot: Snapshot) -> str:
+    if command.name not in PROJECTOR_SETTINGS:
+        return f"a projector has no setting '{command.name}'"
+    healths = [device.health for device in snapshot.devices if device.kind == "projector"]
+    if not healths or healths[0] is DeviceHealth.ABSENT:
+        return "there is none to be told: name its backend under [projector]"
+    if healths[0] is DeviceHealth.LOST:
+        return "it does not answer: check its mains and its cable, then reopen it"
     return ""
 
 

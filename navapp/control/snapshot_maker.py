@@ -5,7 +5,7 @@ from datetime import date
 
 from navapp.control.camera_link import CameraLink
 from navapp.control.device_handlers import DeviceReport
-from navapp.control.device_lines import camera_line, display_line, rig_line
+from navapp.control.device_lines import camera_line, display_line, rig_line, with_remedy
 from navapp.control.device_monitor import MonitoredDevices
 from navapp.control.display_link import DisplayLink
 from navapp.control.eye_preview import EyePreview
@@ -187,6 +187,9 @@ class SnapshotMaker:
         return self.specification.is_recording and not has_stopped
 
     def _device_lines(self, reports: tuple[DeviceReport, ...]) -> tuple[DeviceLine, ...]:
+        return tuple(with_remedy(line) for line in self._list_devices(reports))
+
+    def _list_devices(self, reports: tuple[DeviceReport, ...]) -> tuple[DeviceLine, ...]:
         lines = (
             camera_line(self.camera.camera.info, self.camera.trouble, self.camera.silence),
             display_line(self.display.display.info, self.display.trouble),

@@ -70,6 +70,7 @@ class DeviceLine:
     name: str
     health: DeviceHealth
     detail: str = ""
+    remedy: str = ""  # of one in trouble: what to do
 
 
 @dataclass(frozen=True, slots=True)

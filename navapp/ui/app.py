@@ -20,6 +20,7 @@ from navapp.control.commands import (
     OverrideGate,
     Quit,
     Register,
+    SetProjector,
     ToggleLayer,
     TouchPoint,
     WithdrawCondition,
@@ -45,7 +46,7 @@ from navapp.ui.gates_page import REASONS, GatesPage, condition_of_key
 from navapp.ui.help_page import HelpPage
 from navapp.ui.layers_page import LayersPage
 from navapp.ui.main_screen import MainScreen
-from navapp.ui.pages import DevicesPage, EventsPage, QuitQuestion
+from navapp.ui.pages import DevicesPage, EventsPage, PowerQuestion, QuitQuestion
 from navapp.ui.palette import ActionProvider
 from navapp.ui.picks_page import PicksChecked, PicksPage, Place
 from navapp.ui.pictures.graphics import Graphics
@@ -289,6 +290,18 @@ class NavigationApp(QuietApp):
     def action_forget_points(self) -> None:
         """Begin the check anew."""
         self._session.submit(ForgetPoints())
+
+    def action_set_projector(self, name: str) -> None:
+        """Tell the projector a setting: from the devices' page; asked before it goes off."""
+
+        def finish(is_sure: bool | None) -> None:
+            if is_sure:
+                self._say_of(name, SetProjector)
+
+        if name == "off":
+            self.push_screen(PowerQuestion(self._view), finish)
+        else:
+            finish(is_sure=True)
 
     def _say_of(self, name: str | None, word: Callable[[str], Command]) -> None:
         """A person's word for what a letter of a page means; nothing where it means nothing."""

@@ -20,15 +20,21 @@ from navapp.ui.view import View
 
 
 class DeviceDetails(TextView):
-    """Every device with its name and what it says."""
+    """Every device with its name, what it says, and what to do where it is in trouble."""
 
     def build(self, view: View, width: int, height: int) -> list[Content]:
-        """A line a device, what it says below."""
+        """A line a device, the rest below."""
         lines = []
         for device in view.snapshot.devices:
             lines.append(format_device_line(view, dataclasses.replace(device, detail=""), width))
             said = textwrap.wrap(device.detail, max(width - 2, 1)) or [""]
             lines += [Content(f"  {line}") for line in said]
+            remedy = textwrap.wrap(device.remedy, max(width - 5, 1))
+            marks = ["->", *["  "] * len(remedy)]
+            lines += [
+                Content.styled(f"  {mark} {line}", "bold $foreground")
+                for mark, line in zip(marks, remedy, strict=False)
+            ]
         return lines or [Content("no devices")]
 
 
@@ -38,9 +44,14 @@ class DevicesPage(PageScreen):
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("d", "dismiss", "back", show=False),
         ACTION_OF_NAME["reconnect"].binding(),
+        Binding("p", "app.set_projector('on')", "projector on", show=False),
+        Binding("P", "app.set_projector('off')", "projector off", show=False),
+        Binding("s", "app.set_projector('source')", "projector's source", show=False),
+        Binding("f", "app.set_projector('flips')", "projector's flips", show=False),
     ]
 
-    page_title, keys = "devices", " back  o reopen lost devices"
+    page_title = "devices"
+    keys = " back  o reopen lost  projector: p on  P off  s source  f flips"
 
     def compose_page(self) -> ComposeResult:
         """Devices."""
@@ -71,16 +82,21 @@ class EventsPage(PageScreen):
 
 
 class QuestionText(TextView):
-    """What quitting means, and the two answers."""
+    """What a question is about, and the answers to it."""
+
+    def __init__(self, question: str, meaning: str, yes: str, no: str) -> None:
+        super().__init__("question")
+        self._words = question, meaning, yes, no
 
     def build(self, view: View, width: int, height: int) -> list[Content]:
         """Words first, keys below."""
+        question, meaning, yes, no = self._words
         return [
-            Content.styled("End the session?", "bold $foreground"),
-            Content("The display goes dark, the registration is lost."),
+            Content.styled(question, "bold $foreground"),
+            Content(meaning),
             Content(""),
             Content.assemble(
-                ("y", "bold $primary"), " end   ", ("n", "bold $primary"), " stay   ",
+                ("y", "bold $primary"), f" {yes}   ", ("n", "bold $primary"), f" {no}   ",
                 ("SPACE", "bold $primary"), " blank only",
             ),
         ]  # fmt: skip
@@ -96,4 +112,24 @@ class QuitQuestion(ViewScreen[bool], ModalScreen[bool]):
 
     def compose(self) -> ComposeResult:
         """A box over the picture, which goes on."""
-        yield QuestionText("question")
+        yield QuestionText(
+            "End the session?", "The display goes dark, the registration is lost.", "end", "stay"
+        )
+
+
+class PowerQuestion(ViewScreen[bool], ModalScreen[bool]):
+    """Asked before the projector is switched off; only `y` does it."""
+
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("y", "dismiss(True)", "switch off", show=False),
+        Binding("n,escape,q", "dismiss(False)", "leave it", show=False),
+    ]
+
+    def compose(self) -> ComposeResult:
+        """A box over the devices."""
+        yield QuestionText(
+            "Switch the projector off?",
+            "It shows nothing until its lamp is warm again.",
+            "switch off",
+            "leave it",
+        )

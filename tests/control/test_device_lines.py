@@ -2,9 +2,9 @@
 
 import pytest
 
-from navapp.control.device_lines import rig_line
+from navapp.control.device_lines import rig_line, with_remedy
 from navapp.control.length_check import Finding, LengthCheck
-from navapp.control.states import DeviceHealth
+from navapp.control.states import DeviceHealth, DeviceLine
 
 S = 1_000_000_000
 
@@ -52,3 +52,20 @@ def test_the_last_word_stays_beside_looks_that_do_not_say_one_yet() -> None:
 def test_a_rig_that_moved_is_told_before_all_else() -> None:
     line = rig_line("rig", "rig moved", check(Finding.WITHIN), 9 * S)
     assert (line.health, line.detail) == (DeviceHealth.TROUBLE, "rig moved")
+
+
+KINDS = ("camera", "display", "projector", "mirror", "rig", "recording")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("health", DeviceHealth)
+def test_every_device_in_trouble_says_what_to_do_and_no_other(
+    kind: str, health: DeviceHealth
+) -> None:
+    is_failed = health in (DeviceHealth.TROUBLE, DeviceHealth.LOST)
+    assert bool(with_remedy(DeviceLine(kind, "x", health)).remedy) is is_failed
+
+
+def test_what_a_device_says_itself_comes_first() -> None:
+    line = DeviceLine("projector", "x", DeviceHealth.TROUBLE, "standby", "p switches it on")
+    assert with_remedy(line) == line

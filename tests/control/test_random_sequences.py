@@ -24,6 +24,7 @@ from navapp.control.commands import (
     Reconnect,
     Register,
     Reject,
+    SetProjector,
     Show,
     ToggleDepth,
     ToggleEye,
@@ -68,7 +69,7 @@ def any_command(rng: np.random.Generator, snapshot: Snapshot) -> Command:
         CheckMirror(), NudgeCross(1, 0), ConfirmCross(), EnterStage(number),
         OverrideGate(snapshot.gate_stage, "a test"), OverrideGate(number, " "),
         WithdrawCondition(name), ConfirmStep("top"), WithdrawStep("top"), ConfirmStep("nose"),
-        Reconnect(), Interrupt(),
+        Reconnect(), SetProjector("on"), SetProjector("colour"), Interrupt(),
     )  # fmt: skip
     rare: tuple[Command, ...] = (DistrustRig("the board looks longer"), Quit())
     kind = rng.random()
