@@ -135,12 +135,11 @@ def describe_slowness(snapshot: Snapshot) -> str:
     rates = snapshot.rates
     if rates.frames_per_s is None or not rates.latency_history_ms:
         return Reason.TOO_SLOW.value
-    longest_ms = _longest_ms(snapshot)
     # A picture is handled for as long as the next one is waited for.
-    needed = 2e3 / longest_ms
+    needed = 2e3 / _longest_ms(snapshot)
     return (
-        f"this computer makes {rates.frames_per_s:.1f} pictures a second, {_latency_ms(rates):.0f} "
-        f"ms late; guides need {needed:.0f}, and none may be older than {longest_ms:.0f} ms"
+        f"too slow: {rates.frames_per_s:.1f} pictures a second, {_latency_ms(rates):.0f} ms late; "
+        f"guides need {needed:.0f}"
     )
 
 

@@ -136,7 +136,13 @@ class NavigationApp(QuietApp):
         self._n_unchanged = 0
         snapshot = session.snapshot()
         start_ns = min([snapshot.time_ns, *(event.time_ns for event in snapshot.events)])
-        self._view = View(snapshot, symbols, start_ns, title=title)
+        self._view = View(
+            snapshot,
+            symbols,
+            start_ns,
+            title=title,
+            has_colours=graphics is None or graphics.has_colours,
+        )
         self._known_events: frozenset[Event] = frozenset()
         self._start_box: Box | None = None  # as it was drawn last
         self._picks: dict[str, Place] = {}  # as they were picked last

@@ -152,6 +152,9 @@ def _candidate(view: View, width: int) -> list[Content]:
     if is_too_slow(snapshot):
         slow = textwrap.wrap("too slow to draw it in time", width)
         lines += [Content.styled(line, Level.BAD.value) for line in slow]
+    if not view.has_colours:
+        told = textwrap.wrap("no outline in so few colours: judge it in --window", width)
+        lines += [Content.styled(line, Level.BAD.value) for line in told]
     others = [Content("arrows: compare")] if len(snapshot.candidates) > 1 else []
     asks = [
         *others,

@@ -11,9 +11,10 @@ NAVAPP_THEME = Theme(
     background="#0d1217",
     surface="#0d1217",
     panel="#1b242d",
-    # Relative luminance about 0.65, 0.40 and 0.17: told apart without hue.
+    # Relative luminance about 0.65, 0.47 and 0.17: told apart without hue; the 16
+    # colours of old terminals make them green, yellow and red.
     success="#9fe0b5",
-    warning="#e6a02e",
+    warning="#e0b020",
     error="#d8433b",
     dark=True,
     variables={

@@ -91,6 +91,7 @@ class View:
     title: str = "navapp"  # of the application
     # the picture shows the region around the bone; None: as suits how it is drawn.
     is_near: bool | None = None
+    has_colours: bool = True  # enough of them, so that an outline is seen in the picture
 
     @property
     def is_navigable(self) -> bool:

@@ -26,6 +26,7 @@ WORDS: tuple[tuple[str, str], ...] = (
     ("interior, mismatch", "z: a guess within a gap; a guess where the pictures disagree"),
     ("ok, absent, lost", "a device works; is none, which is no fault; does not answer"),
     ("candidate", "a pose that a search has found and nobody has accepted"),
+    ("no outline in so few", "of a terminal's colours: run --window, or another terminal"),
     ("candidate 2, 3 wait", "the second of three; arrows show the others, a and r decide on it"),
     ("judged OK", "may be accepted; the judge found nothing against it"),
     ("DEGRADED", "the pose is there but not good enough; the reason is said"),

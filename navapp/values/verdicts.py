@@ -112,7 +112,7 @@ _REMEDIES = {
     Reason.MIRROR_CHECK_FAILED: "look from the calibrated place and check again, or calibrate",
     Reason.MIRROR_CHECK_OLD: "check it again on three corners or points",
     Reason.POSE_TOO_OLD: "wait for the next frame",
-    Reason.TOO_SLOW: "end other programs, take smaller pictures, or use a faster computer",
+    Reason.TOO_SLOW: "end other programs, or use a faster computer",
     Reason.STAGE_WITHOUT_BONE: "add the bone's surface to the plan",
     Reason.CHECK_FAILED: "register again, or check again on the page of the tools (u)",
     Reason.TIME_OUT_OPEN: "confirm patient, side and plan on the page of the gates",

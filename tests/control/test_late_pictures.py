@@ -159,6 +159,6 @@ def test_a_slow_computer_is_told_once_and_again_when_it_has_been_fast_meanwhile(
         bench.camera.is_silent = True
         bench.frames()
         bench.camera.is_silent = False
-    slow = [text for text in told(bench) if text.startswith("no guides: this computer makes 2.9")]
+    slow = [text for text in told(bench) if text.startswith("no guides: too slow: 2.9 pictures")]
     assert len(slow) == 2
     assert bench.controller.snapshot_now().reasons == (Reason.TOO_SLOW,)

@@ -38,6 +38,8 @@ from navapp.ui.help_page import HelpPage
 from navapp.ui.layers_page import LayersPage
 from navapp.ui.main_screen import MainScreen, SmallNotice
 from navapp.ui.pages import DevicesPage, EventsPage, QuitQuestion
+from navapp.ui.pictures.blocks import CELL_PX, BlockEncoder
+from navapp.ui.pictures.graphics import Graphics
 from navapp.ui.pictures.picture_view import PictureView
 from navapp.ui.pose_panel import PosePanel
 from tests.ui import snapshots
@@ -397,3 +399,11 @@ def test_arrows_go_through_candidates_where_several_wait() -> None:
     assert app.session.commands == [ChooseCandidate(1), ChooseCandidate(-1)]
     app = play(snapshots.navigating(cross_check=CHECKING), script)
     assert app.session.commands == [NudgeCross(1, 0), NudgeCross(-1, 0)]
+
+
+def test_without_an_encoder_the_screen_knows_that_no_outline_is_seen() -> None:
+    session = snapshots.ScriptedSession(snapshots.review())
+    assert NavigationApp(session, polls_per_s=0)._view.has_colours
+    assert not NavigationApp(session, polls_per_s=0, graphics=Graphics())._view.has_colours
+    blocks = Graphics(BlockEncoder(is_true_colour=False), CELL_PX)
+    assert NavigationApp(session, polls_per_s=0, graphics=blocks)._view.has_colours

@@ -51,7 +51,7 @@ def test_the_help_page_has_the_legend_of_the_overlay() -> None:
         await pilot.press("question_mark")
         legend = app.screen.query_one(OverlayLegend)
         assert not app.screen.can_view_entire(legend)
-        await pilot.press("pagedown")
+        await pilot.press("pagedown", "pagedown")
         await pilot.pause(0.5)
         assert app.screen.can_view_entire(legend)
         text = str(legend.render())

@@ -75,6 +75,11 @@ class Graphics:
     words: str = "half blocks"  # for people; with the reason where they are half blocks
 
     @property
+    def has_colours(self) -> bool:
+        """They have so many colours that an outline is seen in them."""
+        return self.encoder is not None
+
+    @property
     def has_pixels(self) -> bool:
         """They are drawn in pixels."""
         return self.encoder is not None and self.encoder.has_pixels
