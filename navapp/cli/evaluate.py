@@ -20,7 +20,7 @@ examples:
 registered once and then followed. The folder gets tables.md, report.html, evaluate.json and
 frames.csv. Killed in the middle and started again with the same options, it goes on.
 """
-_FRAMES, _QUICK_FRAMES = 40, 5
+_TESTS, _FRAMES, _QUICK_FRAMES = 5, 40, 5
 
 
 def add_parser(subparsers: Any) -> None:
@@ -42,10 +42,8 @@ def add_parser(subparsers: Any) -> None:
         parser.add_argument(
             option, nargs="+", choices=names, default=list(names), help=f"{what} (all)"
         )
-    parser.add_argument("--tests", type=int, default=5, metavar="N", help="of each case (5)")
-    parser.add_argument(
-        "--frames", type=int, default=_FRAMES, metavar="N", help=f"of each test ({_FRAMES})"
-    )
+    parser.add_argument("--tests", type=int, metavar="N", help=f"of each case ({_TESTS})")
+    parser.add_argument("--frames", type=int, metavar="N", help=f"of each test ({_FRAMES})")
     parser.add_argument("--seed", type=int, metavar="N", help="of the first knee")
     parser.add_argument(
         "--quick", action="store_true", help="one test of 5 frames of each case: no results"
@@ -85,16 +83,20 @@ def _read_settings(options: argparse.Namespace) -> "CampaignSettings":
     from navapp.evaluation.campaign import CampaignSettings
     from navapp.evaluation.cases import ALL_CASES, FIRST_SEED, METHODS, MOST_TESTS
 
-    n_tests, n_frames = options.tests, options.frames
-    if options.quick:
-        n_tests, n_frames = 1, _QUICK_FRAMES
+    if options.quick and (options.tests, options.frames) != (None, None):
+        raise UsageError(
+            f"--quick is one test of {_QUICK_FRAMES} frames of each case",
+            remedy="leave out --tests and --frames",
+        )
+    n_tests = 1 if options.quick else _or(options.tests, _TESTS)
+    n_frames = _QUICK_FRAMES if options.quick else _or(options.frames, _FRAMES)
     if not 1 <= n_tests <= MOST_TESTS:
         raise UsageError(f"--tests must be from 1 to {MOST_TESTS}")
     if n_frames < 1:
         raise UsageError("--frames must be at least 1")
     if options.processes is not None and options.processes < 1:
         raise UsageError("--processes must be at least 1")
-    seed = FIRST_SEED if options.seed is None else options.seed
+    seed = _or(options.seed, FIRST_SEED)
     if seed < 0:
         raise UsageError("--seed must not be negative")
     cases = tuple(
@@ -106,6 +108,10 @@ def _read_settings(options: argparse.Namespace) -> "CampaignSettings":
     )
     methods = tuple(name for name in METHODS if name in options.methods)
     return CampaignSettings(cases, methods, n_tests, n_frames, seed, options.quick)
+
+
+def _or(given: int | None, usual: int) -> int:
+    return usual if given is None else given
 
 
 def _say(summary: dict[str, Any], out: str, diagnostics: Diagnostics) -> None:

@@ -1,10 +1,9 @@
-"""Runs the tests of all cases, two at a time, and keeps each in a folder as it is done."""
+"""Runs the tests of all cases, some at a time, and keeps each in a folder as it is done."""
 
 import json
-import multiprocessing
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict, dataclass
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +13,7 @@ from navapp.evaluation.cases import Case, CaseTest, list_tests
 from navapp.evaluation.following import follow
 from navapp.evaluation.scores import Followed
 from navapp.evaluation.sequence import render_test
+from navapp.evaluation.workers import run_in_processes
 from navapp.evaluation.worst_frame import draw_worst_frame
 from navapp.geometry.whole_files import write_whole
 from navapp.tracking import Method
@@ -69,27 +69,36 @@ class CampaignFolder:
 
     Raises:
         UsageError: it holds something else, or another campaign.
+        InputError: it cannot be made, or its settings are damaged.
     """
 
     def __init__(self, folder: str | Path, settings: CampaignSettings) -> None:
         self.path, self._settings = Path(folder), settings
         wanted, kept = settings.to_json(), self.path / _SETTINGS
         if kept.is_file():
-            if json.loads(kept.read_text(encoding="utf-8")) != wanted:
+            if _read_settings(kept) != wanted:
                 raise UsageError(
                     f"{folder} holds another evaluation",
                     subject=str(folder),
                     remedy="give the same options to go on with it, or choose another --out",
                 )
             return
-        if self.path.exists() and any(self.path.iterdir()):
+        is_folder = self.path.is_dir()
+        if self.path.exists() and (not is_folder or any(self.path.iterdir())):
             raise UsageError(
-                f"{folder} holds something else",
+                f"{folder} holds something else" if is_folder else f"{folder} is no folder",
                 subject=str(folder),
                 remedy="choose a new folder for --out",
             )
-        for part in (_TESTS, _TIMES, _PICTURES):
-            (self.path / part).mkdir(parents=True, exist_ok=True)
+        try:
+            for part in (_TESTS, _TIMES, _PICTURES):
+                (self.path / part).mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(
+                f"folder {folder} cannot be made",
+                subject=str(folder),
+                remedy="choose another place for --out",
+            ) from error
         write_whole(kept, (json.dumps(wanted, indent=1) + "\n").encode())
 
     def file_of(self, test: CaseTest, *, is_timed: bool) -> Path:
@@ -101,8 +110,13 @@ class CampaignFolder:
         return self.path / _PICTURES / f"{test.name}.jpg"
 
     def missing(self, tests: Sequence[CaseTest], *, is_timed: bool) -> list[CaseTest]:
-        """Tests that are not done yet."""
-        return [test for test in tests if not self.file_of(test, is_timed=is_timed).is_file()]
+        """Tests that are not done yet.
+
+        Raises:
+            InputError: a file is damaged; better told now than after hours.
+        """
+        done = {one.test for one in self.read(is_timed=is_timed)}
+        return [test for test in tests if test not in done]
 
     def read(self, *, is_timed: bool) -> Iterator[Done]:
         """All that is done, in the order of the tests.
@@ -147,37 +161,18 @@ def run_campaign(
     total = len(settings.tests) + len(timed)
     n_done = total - len(missing) - len(slow)
     for part, processes, is_timed in ((missing, n_processes, False), (slow, 1, True)):
-        for test in _run_all(folder, settings, part, processes, is_timed=is_timed):
+        run = partial(run_test, folder, settings, is_timed=is_timed)
+        for test in run_in_processes(run, part, processes):
             n_done += 1
             on_progress(n_done, total, test.name)
-
-
-def _run_all(
-    folder: CampaignFolder,
-    settings: CampaignSettings,
-    tests: Sequence[CaseTest],
-    n_processes: int,
-    *,
-    is_timed: bool,
-) -> Iterator[CaseTest]:
-    # Spawned: a process that was forked from one with threads may hang.
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(n_processes, mp_context=context) as pool:
-        jobs = {
-            pool.submit(run_test, folder, settings, test, is_timed=is_timed): test for test in tests
-        }
-        try:
-            for job in as_completed(jobs):
-                job.result()
-                yield jobs[job]
-        finally:
-            pool.shutdown(wait=True, cancel_futures=True)
 
 
 def run_test(
     folder: CampaignFolder, settings: CampaignSettings, test: CaseTest, *, is_timed: bool
 ) -> None:
     """Render a test and follow it with every method; the file appears when all is done."""
+    if is_timed:
+        _warm_up(settings.tests[0], settings.methods)
     sequence = render_test(test, settings.n_frames + 1)
     answers = {method: follow(sequence, method) for method in settings.methods}
     if not is_timed and "bimcc" in answers:
@@ -191,3 +186,20 @@ def run_test(
     }
     path = folder.file_of(test, is_timed=is_timed)
     write_whole(path, (json.dumps(content, allow_nan=False) + "\n").encode())
+
+
+@cache
+def _warm_up(test: CaseTest, methods: tuple[Method, ...]) -> None:
+    """Load what a process compiles or reads at its first frames: it belongs to no test's times."""
+    sequence = render_test(test, 3)
+    for method in methods:
+        follow(sequence, method)
+
+
+def _read_settings(path: Path) -> Any:
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise InputError(
+            f"{path} is damaged", subject=str(path), remedy="choose a new folder for --out"
+        ) from error

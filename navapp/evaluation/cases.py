@@ -54,8 +54,7 @@ STAGE_NAMES = tuple(stage.name for stage in STAGES)
 METHODS: tuple[Method, ...] = ("icp", "paper", "bimcc")
 # No test and no choice of a constant uses the seeds from here on.
 FIRST_SEED = 90_001
-TESTS = 5
-# Later tests of a cell have seeds of their own, however many there are.
+# Seeds of a case: its later tests have their own, however many there are.
 MOST_TESTS = 100
 
 

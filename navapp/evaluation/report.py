@@ -36,7 +36,7 @@ def _show(pictures: Mapping[Case, bytes], rows: Sequence[Row]) -> str:
     figures = []
     for case, picture in pictures.items():
         row = ours.get(case)
-        told = "" if row is None else f": TRE {format_mm(row.tre_mm)} mm on average"
+        told = "" if row is None else f": mean TRE of the case {format_mm(row.tre_mm)} mm"
         data = base64.b64encode(picture).decode("ascii")
         figures.append(
             f'<figure style="display:inline-block;margin:.5em"><img alt="{escape(case.name)}" '

@@ -2,6 +2,7 @@
 
 import csv
 import io
+import os
 import platform
 from collections.abc import Sequence
 from pathlib import Path
@@ -50,7 +51,8 @@ def _of(case: Case, done: Sequence[Done]) -> list[Done]:
 
 def _about(settings: CampaignSettings, done: Sequence[Done]) -> list[str]:
     return [
-        f"navapp {__version__}, Python {platform.python_version()}, {platform.machine()}",
+        f"navapp {__version__}, Python {platform.python_version()}, {platform.machine()}, "
+        f"{os.cpu_count()} cores",
         f"{len(done)} of {len(settings.tests)} tests, each another knee, {settings.n_frames} "
         f"frames each after the registration; first seed {settings.first_seed}",
         "age changes the fine relief of the simulated bones only: 0.10 mm (20 to 30) against "

@@ -46,7 +46,7 @@ class FrameScore:
 class Followed:
     """What a method made of a sequence."""
 
-    # of the first registration that left a pose, with those that failed before; None: none did.
+    # of the first registration whose pose was followed, with those that failed before; None: none.
     registration_s: float | None
     n_registrations: int  # searches that were made
     frames: tuple[FrameScore, ...]  # after the frame of the first search

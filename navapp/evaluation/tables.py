@@ -133,4 +133,7 @@ def _fps(value: float | None) -> str:
 
 
 def _percent(share: float) -> str:
-    return f"{100.0 * share:.0f} %"
+    """Whole; only all is 100 %, and only nothing 0 %."""
+    if 0.0 < share < 0.01:
+        return "< 1 %"
+    return "> 99 %" if 0.99 < share < 1.0 else f"{100.0 * share:.0f} %"

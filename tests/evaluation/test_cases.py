@@ -1,0 +1,122 @@
+"""The cases of the paper's tables, and their seeds, that nothing else uses."""
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from navapp.evaluation.cases import (
+    ALL_CASES,
+    FIRST_SEED,
+    MOST_TESTS,
+    SAMPLES,
+    SITUATIONS,
+    STAGE_NAMES,
+    list_tests,
+)
+
+ROOT = Path(__file__).parents[2]
+SEEDS = range(FIRST_SEED, FIRST_SEED + len(ALL_CASES) * MOST_TESTS)
+# Numbers that are no seeds: where a mirror is driven to, and where the range is told.
+NO_SEEDS = {
+    ("tests/drivers/test_zaber_mirror.py", SEEDS[-1]),
+    ("navapp/evaluation/cases.py", FIRST_SEED),
+    ("docs/evaluation.md", FIRST_SEED),
+    ("docs/evaluation.md", SEEDS[-1]),
+}
+
+
+def test_sixty_cases_in_the_papers_order() -> None:
+    assert len(ALL_CASES) == len(set(ALL_CASES)) == 3 * 5 * 4
+    assert tuple(SAMPLES) == ("man", "woman", "adult")
+    assert STAGE_NAMES == ("opening", "drilling", "implant", "patella", "spacer")
+    assert tuple(SITUATIONS) == ("registration", "overlay", "patient", "instrument")
+    names = [case.name for case in ALL_CASES]
+    assert names[:5] == [
+        "man-opening-registration", "man-opening-overlay", "man-opening-patient",
+        "man-opening-instrument", "man-drilling-registration",
+    ]  # fmt: skip
+    assert (names[20], names[-1]) == ("woman-opening-registration", "adult-spacer-instrument")
+
+
+def test_every_test_has_a_seed_and_a_name_of_its_own() -> None:
+    tests = list(list_tests(ALL_CASES, MOST_TESTS, FIRST_SEED))
+    assert [test.seed for test in tests] == list(SEEDS)
+    assert len({test.name for test in tests}) == len(tests)
+
+
+def test_a_test_keeps_its_seed_whatever_else_is_run() -> None:
+    whole = {test.name: test.seed for test in list_tests(ALL_CASES, 5, FIRST_SEED)}
+    for case in ALL_CASES[::7]:
+        for test in list_tests([case], 2, FIRST_SEED):
+            assert whole[test.name] == test.seed
+    some = list(list_tests(ALL_CASES[58:], 7, FIRST_SEED))
+    assert all(whole.get(test.name, test.seed) == test.seed for test in some)
+    assert len(some) == 14
+
+
+def test_more_tests_than_seeds_are_refused() -> None:
+    with pytest.raises(ValueError, match="at most 100"):
+        list(list_tests(ALL_CASES, MOST_TESTS + 1, 1))
+
+
+def test_a_test_configures_its_knee_and_its_situation() -> None:
+    tests = {test.name: test for test in list_tests(ALL_CASES, 4, 7)}
+    adults = [tests[f"adult-opening-instrument-{n}"].configure().camera for n in range(4)]
+    simulated = [camera.simulated for camera in adults]
+    assert [one.sex for one in simulated] == ["male", "female", "male", "female"]
+    assert [one.side for one in simulated] == ["right", "left", "right", "left"]
+    assert {one.age_group for one in simulated} == {"young"}
+    assert {(one.motion, one.instrument, one.stepped) for one in simulated} == {
+        ("breathing", "sweep", True)
+    }
+    assert [one.seed for one in simulated] == [7 + 43 * MOST_TESTS + n for n in range(4)]
+    woman = tests["woman-spacer-registration-0"].configure().camera.simulated
+    assert (woman.sex, woman.age_group, woman.motion, woman.instrument) == (
+        "female", "middle", "still", "none",
+    )  # fmt: skip
+    assert tests["man-drilling-patient-0"].configure().camera.simulated.motion == "patient"
+    assert tests["man-drilling-overlay-0"].configure().camera.simulated.instrument == "none"
+
+
+def integers_of(path: Path) -> Iterator[int]:
+    text = path.read_text(encoding="utf-8")
+    if path.suffix == ".py":
+        for node in ast.walk(ast.parse(text)):
+            if isinstance(node, ast.Constant) and type(node.value) is int:
+                yield node.value
+        # Commands in docstrings and comments.
+        text = " ".join(re.findall(r"seed\D{0,3}\d[\d_]*", text))
+    for found in re.findall(r"(?<![\w.])\d[\d_]*(?![\w.]*\w)", text):
+        yield int(found.replace("_", "") or 0)
+
+
+def sources() -> Iterator[Path]:
+    for folder in ("navapp", "drivers", "sim_devices", "calibration", "tests", "docs"):
+        for suffix in ("py", "toml", "md"):
+            yield from sorted((ROOT / folder).rglob(f"*.{suffix}"))
+    yield from (ROOT / name for name in ("README.md", "pyproject.toml"))
+
+
+def test_no_test_bench_or_default_uses_a_seed_of_the_evaluation() -> None:
+    used = {
+        (path.relative_to(ROOT).as_posix(), number)
+        for path in sources()
+        for number in integers_of(path)
+        if number in SEEDS
+    }
+    assert used - NO_SEEDS == set()
+
+
+def test_a_seed_would_be_found(tmp_path) -> None:
+    for name, text in (
+        ("a.py", "KneeSpec(@)"),
+        ("b.py", '"""navapp run --seed @"""'),
+        ("c.toml", "seed = @"),
+        ("d.md", "`--seed @`, or more"),
+    ):
+        for number in (f"{FIRST_SEED}", f"{FIRST_SEED:_}"):
+            (tmp_path / name).write_text(text.replace("@", number))
+            assert FIRST_SEED in set(integers_of(tmp_path / name)), name
