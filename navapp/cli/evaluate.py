@@ -5,6 +5,7 @@ import os
 from typing import TYPE_CHECKING, Any
 
 from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
+from navapp.cli.evaluate_recording import add_options, check_no_recording, run_recording
 from navapp.errors import UsageError
 
 if TYPE_CHECKING:
@@ -15,6 +16,7 @@ examples:
   navapp evaluate --quick --out look/            every case, one test of 5 frames: some minutes
   navapp evaluate --out tables/                  all of it: about two hours on two cores
   navapp evaluate --stages opening --methods bimcc --tests 2 --out opening/
+  navapp evaluate --recording pairs/ --rig rig.yml --plan P --truth truth.json --out study/
 
 3 samples x 5 stages x 4 situations x 3 methods, 5 tests each, every test another simulated knee,
 registered once and then followed. The folder gets tables.md, report.html, evaluate.json and
@@ -51,6 +53,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--processes", type=int, metavar="N", help="at a time (the computer's cores, at most 4)"
     )
+    add_options(parser)
     parser.add_argument("--out", metavar="DIR", required=True, help="folder for the results")
     parser.add_argument("--json", metavar="FILE", help="result for programs (- is stdout)")
 
@@ -60,6 +63,9 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     from navapp.evaluation.campaign import CampaignFolder, run_campaign
     from navapp.evaluation.results import write_results
 
+    if options.recording is not None:
+        return _run_recording(options, diagnostics)
+    check_no_recording(options)
     check_writable(options.json)
     settings = _read_settings(options)
     n_processes = options.processes or min(4, os.cpu_count() or 1)
@@ -77,6 +83,22 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     if options.json != "-":
         _say(content["summary"], options.out, diagnostics)
     return 0
+
+
+def _run_recording(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
+    from navapp.evaluation.cases import METHODS, SAMPLES, SITUATIONS, STAGE_NAMES
+
+    usual = {
+        "samples": list(SAMPLES), "stages": list(STAGE_NAMES), "situations": list(SITUATIONS),
+        "tests": None, "frames": None, "seed": None, "quick": False, "processes": None,
+    }  # fmt: skip
+    for name, value in usual.items():
+        if getattr(options, name) != value:
+            raise UsageError(
+                f"--{name} is of simulated knees", remedy="leave it out, or --recording"
+            )
+    methods = [name for name in METHODS if name in options.methods]
+    return run_recording(options, methods, diagnostics)
 
 
 def _read_settings(options: argparse.Namespace) -> "CampaignSettings":

@@ -17,12 +17,21 @@ def draw_worst_frame(sequence: KnownSequence, answers: Answers) -> bytes | None:
 
     Of all frames that the judge calls OK the one with the largest error, else the first one.
     """
-    import cv2
-
     ok = [one for one in answers.followed.frames if one.is_ok and one.tre_mm is not None]
     index = max(ok, key=lambda one: one.tre_mm or 0.0).index if ok else 0
+    return None if sequence.truth[index] is None else draw_frame(sequence, answers, index)
+
+
+def draw_frame(sequence: KnownSequence, answers: Answers, index: int) -> bytes | None:
+    """A JPEG of one frame around the bone; None when neither pose is known, or it is out of view.
+
+    Where the truth is not known as a pose, the estimated outline stands alone.
+    """
+    import cv2
+
     true, drawn = sequence.truth[index], answers.poses[index]
-    if true is None:
+    around = true or drawn
+    if around is None:
         return None
     surface = answers.surface
     left = sequence.frames[index].left
@@ -33,7 +42,7 @@ def draw_worst_frame(sequence: KnownSequence, answers: Answers) -> bytes | None:
             mask = render(surface, pose, camera).mask.astype(np.uint8)
             rims, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
             cv2.drawContours(image, rims, -1, colour, 1, cv2.LINE_AA)
-    box = Box.around(camera.project(true.apply(surface.vertices_mm)))
+    box = Box.around(camera.project(around.apply(surface.vertices_mm)))
     part = None if box is None else box.grow(_MARGIN_PX).clip(camera.width, camera.height)
     if part is None or part.is_empty:
         return None

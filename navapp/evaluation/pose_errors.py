@@ -1,0 +1,33 @@
+"""The errors of one estimated pose against the true one."""
+
+from navapp.evaluation.overlay_error import measure_overlay_error
+from navapp.evaluation.truth import compute_mean_tre_mm
+from navapp.geometry.mesh import TriangleMesh
+from navapp.geometry.rectification import RectifiedGeometry
+from navapp.geometry.transform import FloatArray, RigidTransform
+from navapp.values import BoneModel
+
+
+def measure_pose(
+    pose: RigidTransform,
+    true: RigidTransform,
+    bone: BoneModel,
+    targets_mm: FloatArray,
+    surface: TriangleMesh,
+    geometry: RectifiedGeometry,
+) -> tuple[float | None, float | None, float | None]:
+    """Target registration error, displacement and outline distance of the drawn bone, mm.
+
+    Args:
+        pose: estimated, left camera from bone.
+        true: the same.
+        bone: of the plan.
+        targets_mm: (N, 3) of the stage; may be empty (`compute_mean_tre_mm`).
+        surface: of the bone as it is drawn.
+        geometry: of the rectified pair.
+    """
+    tre_mm = compute_mean_tre_mm(pose, true, bone, targets_mm)
+    drawn = measure_overlay_error(pose, true, surface, geometry)
+    if drawn is None:
+        return tre_mm, None, None
+    return tre_mm, drawn.displacement_mm, drawn.outline_mm
