@@ -2,7 +2,7 @@
 
 import argparse
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from datetime import date
 from typing import Any
@@ -106,12 +106,18 @@ class FrameLog:
     Args:
         n_expected: so many frames, None when that is not known.
         diagnostics: takes the progress and, when verbose, a line a frame.
+        describe: makes that line.
     """
 
-    def __init__(self, n_expected: int | None, diagnostics: Diagnostics) -> None:
+    def __init__(
+        self,
+        n_expected: int | None,
+        diagnostics: Diagnostics,
+        describe: Callable[[FrameResult], str] = frame_text,
+    ) -> None:
         self.results: list[FrameResult] = []
         self._n_expected = n_expected
-        self._diagnostics = diagnostics
+        self._diagnostics, self._describe = diagnostics, describe
         self._started = time.perf_counter()
 
     def __call__(self, result: FrameResult) -> None:
@@ -120,7 +126,7 @@ class FrameLog:
         frame = replace(result.frame, left=_NO_PICTURE, right=_NO_PICTURE)
         picture = replace(result.picture, image=_NO_PICTURE)
         self.results.append(replace(result, frame=frame, picture=picture))
-        self._diagnostics.detail(frame_text(result))
+        self._diagnostics.detail(self._describe(result))
         self._diagnostics.tell_live(self._line(result), is_last=self.is_full)
 
     def _line(self, result: FrameResult) -> str:

@@ -74,6 +74,9 @@ def add_parser(subparsers: Any) -> None:
         default="forward",
         help="pingpong: to and fro; each: every frame is registered on its own from the prior",
     )
+    parser.add_argument(
+        "--truth", metavar="T", help="poses of the bones: the error of every frame is told"
+    )
     parser.add_argument("--frames", type=int, metavar="N", help="end after N frames")
     parser.add_argument("--start", type=int, default=0, metavar="I", help="first picture's number")
     parser.add_argument("--fps", type=float, metavar="F", help="rate where there are no times (15)")
@@ -111,7 +114,8 @@ class _Replay:
 def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     """Do it."""
     from navapp.cli.headless import FrameLog, check_accepted, check_start, report_result
-    from navapp.cli.results import frame_to_json, rig_alarm_to_json
+    from navapp.cli.replay_truth import read_replay_truth
+    from navapp.cli.results import frame_text, frame_to_json, rig_alarm_to_json
     from navapp.config import find_file, load
     from navapp.control.beside_femur import may_start_from
     from navapp.devices import open_recording
@@ -131,10 +135,15 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
         for bone in (first, *specification.others):
             if not may_start_from(bone, first):
                 check_start(specification.prior, bone)
+    truth = read_replay_truth(options, specification.plan, specification.stage.bone)
     opened = open_recording(options.sequence, settings, rig, configuration)
-    log = FrameLog(opened.devices.camera.info.n_frames, diagnostics)
+    describe = frame_text if truth is None else truth.tell
+    log = FrameLog(opened.devices.camera.info.n_frames, diagnostics, describe)
     seconds, failure = _run_session(replay, opened, log, options, settings.rate_hz, diagnostics)
-    frames = [frame_to_json(result, {}) for result in log.results]
+    frames = [
+        frame_to_json(result, {} if truth is None else truth.measure(result))
+        for result in log.results
+    ]
     moved = replay.rig_moved
     told = None if moved is None else rig_alarm_to_json(rig.name, *moved)
     measured = [result.measured for result in log.results]

@@ -258,7 +258,7 @@ def summary_text(summary: dict[str, Any]) -> str:
         )
     if tre is not None:
         lines.append(
-            f"simulated TRE while navigating: median {tre['median']:.2f} mm, "
+            f"TRE against the truth, while navigating: median {tre['median']:.2f} mm, "
             f"95 % {tre['p95']:.2f} mm, worst {tre['max']:.2f} mm"
         )
     return "\n".join(lines)
