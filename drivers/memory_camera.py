@@ -1,6 +1,5 @@
-"""A stereo camera that hands out frames that are in memory already."""
+"""A stereo camera that hands out frames of a sequence, in memory or loaded when asked for."""
 
-from collections import deque
 from collections.abc import Sequence
 
 from drivers.clock import Clock
@@ -10,12 +9,12 @@ from navapp.errors import DeviceLost, EndOfSequence, UnsupportedControl
 
 
 class MemoryCamera:
-    """Steps through frames in their order and moves the clock to each; opening starts again.
+    """Steps through frames in their order and moves the clock to each; reopening starts again.
 
     Args:
-        frames: at least one.
-        clock: moved to each capture time.
-        name: for people.
+        frames: at least one; each is asked for once each time the camera is opened, but the first.
+        clock: moved to where each frame was received.
+        name: for people; that of simulated pictures begins with sim: then.
         is_simulated: the pictures are not of this world.
     """
 
@@ -29,22 +28,23 @@ class MemoryCamera:
     ) -> None:
         if not frames:
             raise ValueError("a camera needs at least one frame")
-        self._frames, self._clock = tuple(frames), clock
-        self._name, self._is_simulated = name, is_simulated
-        self._left: deque[StereoFrame] | None = None
+        self._frames, self._clock = frames, clock
+        self._height, self._width = frames[0].left.shape[:2]
+        self._name = f"sim:{name}" if is_simulated else name
+        self._is_simulated = is_simulated
+        self._place: int | None = None  # of the frame that is next
         self._meter = FrameMeter()
 
     @property
     def info(self) -> CameraInfo:
         """Size and length of the sequence."""
-        height, width = self._frames[0].left.shape[:2]
         return CameraInfo(
             name=self._name,
             backend="memory",
             is_simulated=self._is_simulated,
             is_stepped=True,
-            width=width,
-            height=height,
+            width=self._width,
+            height=self._height,
             measured_rate_hz=self._meter.rate_hz,
             measured_skew_ms=self._meter.skew_ms,
             n_frames=len(self._frames),
@@ -52,8 +52,8 @@ class MemoryCamera:
 
     def open(self) -> None:
         """Begin with the first frame, unless it is open."""
-        if self._left is None:
-            self._left, self._meter = deque(self._frames), FrameMeter()
+        if self._place is None:
+            self._place, self._meter = 0, FrameMeter()
 
     def read(self, timeout_s: float) -> StereoFrame:
         """The next frame, at once.
@@ -61,12 +61,13 @@ class MemoryCamera:
         Raises:
             DeviceLost, EndOfSequence: see `StereoCamera.read`.
         """
-        if self._left is None:
+        if self._place is None:
             raise DeviceLost(f"{self._name} is not open", subject=self._name, remedy="open it")
-        if not self._left:
+        if self._place >= len(self._frames):
             raise EndOfSequence(f"{self._name} ended", subject=self._name)
-        frame = self._left.popleft()
-        self._clock.wait_until_ns(frame.captured_ns)
+        frame = self._frames[self._place]
+        self._place += 1
+        self._clock.wait_until_ns(frame.received_ns)
         self._meter.add(frame)
         return frame
 
@@ -80,4 +81,4 @@ class MemoryCamera:
 
     def close(self) -> None:
         """No frame comes any more."""
-        self._left = None
+        self._place = None

@@ -145,7 +145,7 @@ def _say(summary: dict[str, Any], out: str, diagnostics: Diagnostics) -> None:
             "wrong beyond their bound"
         )
     beside = summary["beside_the_paper"]
-    if beside["cases"]:
+    if beside["cases"] and not summary["quick"]:
         diagnostics.say(
             f"bimcc beside the paper's own figures: nearer in {beside['nearer']}, faster in "
             f"{beside['faster']} of {beside['cases']} cases"

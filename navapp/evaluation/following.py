@@ -15,10 +15,9 @@ from navapp.control.runner import run_headless
 from navapp.control.specification import specify_session
 from navapp.control.states import SessionState, Snapshot
 from navapp.devices import make_memory_devices
-from navapp.evaluation.overlay_error import measure_overlay_error
+from navapp.evaluation.pose_errors import measure_pose
 from navapp.evaluation.scores import Followed, FrameScore
 from navapp.evaluation.sequence import KnownSequence
-from navapp.evaluation.truth import compute_mean_tre_mm
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.rectification import rectifier_of
 from navapp.geometry.transform import RigidTransform
@@ -69,10 +68,13 @@ def follow(sequence: KnownSequence, method: Method) -> Answers:
 
     The paper's two methods carry on what our judge refuses, so that they can be measured; its word
     on them is kept.
+
+    Raises:
+        NavappError: the session ended in a fault: a picture that cannot be read.
     """
     follows_refused = method != "bimcc"
     operator = Follower(follows_refused=follows_refused)
-    judge = _Judge(sequence, operator)
+    judge = _Judge(sequence, operator, follows_refused=follows_refused)
     clock = ManualClock()
     specification = specify_session(
         sequence.configuration,
@@ -98,14 +100,19 @@ def follow(sequence: KnownSequence, method: Method) -> Answers:
         judge.surface = controller.snapshot.bone_surface or judge.surface
         started_s = time.perf_counter()
         run_headless(controller, operator)
+        if controller.failure is not None:
+            raise controller.failure
     return judge.result(started_s)
 
 
 class _Judge:
     """Scores frames as they come; the sequence's truth goes no further."""
 
-    def __init__(self, sequence: KnownSequence, operator: Follower) -> None:
+    def __init__(
+        self, sequence: KnownSequence, operator: Follower, *, follows_refused: bool
+    ) -> None:
         self._sequence, self._operator = sequence, operator
+        self._follows_refused = follows_refused
         self._n_searches = 0  # that were made before the newest frame
         self._bone = sequence.plan.bones[sequence.stage.bone]
         self._targets_mm = sequence.plan.targets_of(sequence.stage.targets)
@@ -121,7 +128,9 @@ class _Judge:
         started_s = time.perf_counter()
         tracked = result.tracked
         pose = None if tracked is None else tracked.left_from_bone
-        if pose is not None and self._registered_s is None:
+        is_lost = tracked is None or tracked.verdict.status is Status.LOST
+        is_kept = pose is not None and (self._follows_refused or not is_lost)
+        if is_kept and self._registered_s is None:
             self._registered_s = started_s - self._spent_s
         self._poses.append(pose)
         is_search = self._operator.n_registrations > self._n_searches
@@ -160,8 +169,4 @@ class _Judge:
     ) -> tuple[float | None, float | None, float | None]:
         if pose is None or true is None:
             return None, None, None
-        tre_mm = compute_mean_tre_mm(pose, true, self._bone, self._targets_mm)
-        drawn = measure_overlay_error(pose, true, self.surface, self._geometry)
-        if drawn is None:
-            return tre_mm, None, None
-        return tre_mm, drawn.displacement_mm, drawn.outline_mm
+        return measure_pose(pose, true, self._bone, self._targets_mm, self.surface, self._geometry)

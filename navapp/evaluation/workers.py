@@ -7,6 +7,8 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from multiprocessing.connection import Connection
 from typing import TypeVar
 
 from navapp.errors import NavappError
@@ -17,7 +19,9 @@ _Item = TypeVar("_Item")
 def run_in_processes(
     do: Callable[[_Item], object], items: Sequence[_Item], n_processes: int
 ) -> Iterator[_Item]:
-    """Items, each as soon as it is done; after an error or an interrupt no further one is begun.
+    """Items, each as soon as it is done; from the main thread.
+
+    After an error or an interrupt the processes are ended at once, whatever they are at.
 
     Args:
         do: the job; found again by its name in another process.
@@ -31,10 +35,16 @@ def run_in_processes(
         return
     # Spawned: a process that was forked from one with threads may hang.
     context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(
-        min(n_processes, len(items)), mp_context=context, initializer=_begin
-    ) as pool:
-        jobs = {pool.submit(do, item): item for item in items}
+    # Nothing is ever written: it ends when this process closes it, or is killed.
+    reader, writer = context.Pipe(duplex=False)
+    n_processes = min(n_processes, len(items))
+    with (
+        reader,
+        writer,
+        ProcessPoolExecutor(n_processes, context, initializer=_begin, initargs=(reader,)) as pool,
+    ):
+        with _without_interrupts():
+            jobs = {pool.submit(do, item): item for item in items}
         try:
             for job in as_completed(jobs):
                 job.result()
@@ -45,18 +55,26 @@ def run_in_processes(
                 remedy="run again, with fewer --processes if memory was short",
             ) from error
         finally:
+            if not all(job.done() for job in jobs):
+                writer.close()
             pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _begin() -> None:
-    # Ctrl+C reaches all processes of a terminal; the first one lets the others finish.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+@contextmanager
+def _without_interrupts() -> Iterator[None]:
+    """Processes that are begun in it ignore ctrl+c, which reaches all of a terminal."""
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
-def _end_with_parent() -> None:
+def _begin(reader: Connection) -> None:
+    threading.Thread(target=_end_with, args=(reader,), daemon=True).start()
+
+
+def _end_with(reader: Connection) -> None:
     """Without this, workers whose parent was killed would wait for jobs for ever."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
+    reader.poll(None)
+    os._exit(1)

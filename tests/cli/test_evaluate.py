@@ -179,6 +179,7 @@ def test_the_same_again_runs_nothing_and_says_the_same(quick, capsys, monkeypatc
     said = capsys.readouterr().out
     assert "a quick look, no results" in said
     assert "bimcc: 5 of 5 frames OK, 0 of them wrong" in said
+    assert "the paper's own figures" not in said, "no results, no comparison"
 
 
 def test_other_options_in_the_same_folder_are_refused(quick, capsys) -> None:

@@ -33,7 +33,7 @@ def sleep(folder: Path, number: int) -> None:
     time.sleep(60.0)
 
 
-def interrupt(folder: Path, number: int) -> None:
-    """As a terminal does with ctrl+c, to this process as well."""
-    os.kill(os.getpid(), signal.SIGINT)
-    note(folder, number)
+def sleep_but_first(folder: Path, number: int) -> None:
+    """The first is done at once."""
+    if number:
+        sleep(folder, number)

@@ -1,5 +1,7 @@
 """Processes that do jobs, and what becomes of them."""
 
+import os
+import signal
 import subprocess
 import sys
 import time
@@ -51,12 +53,8 @@ def test_a_killed_process_is_told_in_a_sentence(tmp_path) -> None:
         list(run_in_processes(partial(jobs.die_at_two, tmp_path), range(9), 1))
 
 
-def test_an_interrupt_lets_a_job_that_has_begun_finish(tmp_path) -> None:
-    assert list(run_in_processes(partial(jobs.interrupt, tmp_path), [7], 1)) == [7]
-    assert (tmp_path / "7").is_file()
-
-
-def test_no_process_outlives_the_one_that_began_it(tmp_path) -> None:
+@pytest.mark.parametrize("how", ["interrupted", "killed"])
+def test_no_process_outlives_the_one_that_began_it(tmp_path, how) -> None:
     code = f"""
 if __name__ == "__main__":
     from functools import partial
@@ -67,15 +65,40 @@ if __name__ == "__main__":
 """
     script = tmp_path / "script.py"
     script.write_text(code)
-    parent = subprocess.Popen([sys.executable, str(script)], env=make_child_environment())
+    parent = subprocess.Popen(
+        [sys.executable, str(script)], env=make_child_environment(), text=True,
+        stderr=subprocess.PIPE, start_new_session=True,
+    )  # fmt: skip
     try:
         workers = [psutil.Process(int(read_when_there(tmp_path / name))) for name in "01"]
-        assert all(worker.is_running() for worker in workers)
+        if how == "interrupted":  # as a terminal does it: all of its processes
+            os.killpg(parent.pid, signal.SIGINT)
+            said = parent.communicate(timeout=10.0)[1]
+            assert said.rstrip().endswith("KeyboardInterrupt")
+            assert "SpawnProcess" not in said, "the workers have nothing to say"
     finally:
         parent.kill()
-        parent.wait()
+        parent.communicate()
     _, alive = psutil.wait_procs(workers, timeout=10.0)
     assert alive == []
+    assert {path.name for path in tmp_path.iterdir()} == {"0", "1", "script.py"}
+
+
+def test_who_takes_no_more_ends_them_at_once(tmp_path) -> None:
+    done = run_in_processes(partial(jobs.sleep_but_first, tmp_path), range(9), 1)
+    assert next(done) == 0
+    read_when_there(tmp_path / "1")
+    began_s = time.monotonic()
+    done.close()
+    assert time.monotonic() - began_s < 10.0
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(read_when_there(tmp_path / "1")), 0)
+
+
+def test_ctrl_c_works_again_afterwards(tmp_path) -> None:
+    before = signal.getsignal(signal.SIGINT)
+    assert list(run_in_processes(partial(jobs.note, tmp_path), [0], 1)) == [0]
+    assert signal.getsignal(signal.SIGINT) is before
 
 
 def read_when_there(path: Path) -> str:

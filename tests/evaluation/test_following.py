@@ -1,0 +1,221 @@
+"""A method on a sequence: what the operator of a test does, which frames count, what is hidden."""
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+
+from navapp.config import Configuration
+from navapp.control.commands import Accept, Register, Reject
+from navapp.control.controller import SessionController
+from navapp.control.stages import STAGES
+from navapp.control.states import SessionState
+from navapp.evaluation import following
+from navapp.evaluation.cases import Case, CaseTest
+from navapp.evaluation.following import Follower, follow
+from navapp.evaluation.sequence import KnownSequence, render_test
+from navapp.evaluation.worst_frame import draw_worst_frame
+from navapp.values import Prior
+from tests.control.fakes import (
+    DOUBTED,
+    GONE,
+    LOST,
+    PERIOD_NS,
+    Bench,
+    FakeTracker,
+    Script,
+    a_frame,
+    a_plan,
+    a_pose,
+    a_rig,
+    answer,
+)
+
+N = 9
+NONSENSE = a_pose(x_mm=57.0, turn_deg=80.0)
+
+
+@pytest.fixture
+def script(monkeypatch) -> Script:
+    """What the trackers of the next sessions answer."""
+    script = Script()
+    make = partial(SessionController, make_tracker=lambda _, bone, *__: FakeTracker(script, bone))
+    monkeypatch.setattr(following, "SessionController", make)
+    return script
+
+
+@pytest.fixture
+def given(monkeypatch) -> list[type]:
+    """The commands that operators give, by their kind."""
+    kinds: list[type] = []
+    whole = Follower.commands
+
+    def note(self, snapshot):
+        commands = whole(self, snapshot)
+        kinds.extend(type(one) for one in commands)
+        return commands
+
+    monkeypatch.setattr(Follower, "commands", note)
+    return kinds
+
+
+def a_sequence(truth=None) -> KnownSequence:
+    frames = [a_frame(10**9 + number * PERIOD_NS, number) for number in range(N)]
+    prior = Prior({"femur": a_pose()})
+    return KnownSequence(
+        frames, truth or [a_pose()] * N, Configuration(), a_rig(), a_plan(), prior, STAGES[0]
+    )
+
+
+@pytest.mark.parametrize("method", ["icp", "paper", "bimcc"])
+def test_it_is_registered_once_and_then_followed(script, given, method) -> None:
+    answers = follow(a_sequence(), method)
+    assert script.calls == ["register femur"] + ["track femur"] * (N - 1)
+    assert given == [Register, Accept]
+    frames = answers.followed.frames
+    assert [frame.index for frame in frames] == list(range(1, N)), "the first is not counted"
+    assert len(answers.poses) == N
+    assert {(frame.status, frame.is_search) for frame in frames} == {("OK", False)}
+    assert answers.followed.n_registrations == 1
+    assert answers.followed.registration_s > 0.0
+
+
+def test_errors_are_those_of_each_frame(script) -> None:
+    # The truth moves by 1 mm a frame, and the answer does not.
+    truth = [a_pose(x_mm=float(number)) for number in range(N)]
+    frames = follow(a_sequence(truth), "bimcc").followed.frames
+    assert [frame.tre_mm for frame in frames] == pytest.approx(range(1, N))
+    assert [frame.displacement_mm for frame in frames] == pytest.approx(range(1, N), abs=1e-6)
+    assert [frame.bound_mm for frame in frames] == [0.8] * (N - 1)
+
+
+@pytest.mark.parametrize(("method", "found"), [("icp", GONE), ("bimcc", GONE), ("bimcc", LOST)])
+def test_a_search_that_fails_is_made_five_times(script, given, method, found) -> None:
+    script.found = [found]
+    answers = follow(a_sequence(), method)
+    assert script.calls == ["register femur"] * 5
+    assert Accept not in given
+    assert answers.followed.n_registrations == 5
+    assert answers.followed.registration_s is None, "nothing was found"
+    frames = answers.followed.frames
+    assert [frame.is_search for frame in frames] == [True] * 4 + [False] * (N - 5)
+    assert {frame.status for frame in frames} == {"LOST"}
+
+
+def test_a_later_search_counts_with_those_before(script, monkeypatch) -> None:
+    script.found = [LOST]
+    whole = FakeTracker.register
+
+    def register(self, *arguments):
+        if script.calls.count("register femur") == 2:
+            script.found = [answer()]
+        return whole(self, *arguments)
+
+    monkeypatch.setattr(FakeTracker, "register", register)
+    followed = follow(a_sequence(), "bimcc").followed
+    assert followed.n_registrations == 3
+    assert followed.registration_s > 0.0
+    assert [frame.status for frame in followed.frames] == ["LOST", *["OK"] * (N - 2)]
+
+
+@pytest.mark.parametrize(
+    ("verdict", "follows_refused", "expected"),
+    [
+        (answer().verdict, False, [Accept(3)]),
+        (answer().verdict, True, [Accept(3)]),
+        (DOUBTED.verdict, False, [Accept(3)]),
+        (LOST.verdict, False, [Reject(3)]),
+        (LOST.verdict, True, []),
+        (None, False, [Reject(3)]),
+        (None, True, []),
+    ],
+)
+def test_what_is_lost_is_never_accepted(verdict, follows_refused, expected) -> None:
+    snapshot = replace(Bench().snapshot, state=SessionState.REVIEW, verdict=verdict, candidate_id=3)
+    assert Follower(follows_refused=follows_refused).commands(snapshot) == expected
+
+
+def test_nothing_is_done_while_it_navigates() -> None:
+    snapshot = replace(Bench().snapshot, state=SessionState.NAVIGATING, verdict=LOST.verdict)
+    assert Follower(follows_refused=False).commands(snapshot) == []
+
+
+def test_ours_accepts_what_is_doubted(script, given) -> None:
+    script.found, script.tracked = [DOUBTED], DOUBTED
+    frames = follow(a_sequence(), "bimcc").followed.frames
+    assert given == [Register, Accept]
+    assert {frame.status for frame in frames} == {"DEGRADED"}
+
+
+@pytest.mark.parametrize("method", ["icp", "paper"])
+def test_the_papers_methods_carry_on_what_is_refused_and_never_accept_it(
+    script, given, method
+) -> None:
+    script.found, script.tracked = [LOST], LOST
+    answers = follow(a_sequence(), method)
+    assert given == [Register]
+    assert script.calls == ["register femur"] + ["track femur"] * (N - 1)
+    assert all(pose is not None for pose in answers.poses)
+    assert {frame.status for frame in answers.followed.frames} == {"LOST"}
+    assert answers.followed.registration_s is not None
+
+
+def test_a_frame_without_truth_has_no_error(script) -> None:
+    truth = [a_pose(), None, *[a_pose()] * (N - 2)]
+    first, second, *_ = follow(a_sequence(truth), "bimcc").followed.frames
+    assert (first.tre_mm, first.displacement_mm, first.outline_mm) == (None, None, None)
+    assert first.is_ok
+    assert second.tre_mm == pytest.approx(0.0)
+
+
+def test_nothing_of_the_truth_is_handed_to_the_session(script, monkeypatch) -> None:
+    class Forbidden:
+        """A truth that says when it is read."""
+
+        def __init__(self) -> None:
+            self.is_answered = False
+
+        def __getitem__(self, place: int):
+            assert self.is_answered, "the truth was read before the method had answered"
+            return a_pose()
+
+    truth = Forbidden()
+    take = following._Judge.take
+
+    def judge(self, result) -> None:
+        truth.is_answered = True
+        take(self, result)
+        truth.is_answered = False
+
+    monkeypatch.setattr(following._Judge, "take", judge)
+    assert follow(replace(a_sequence(), truth=truth), "bimcc").followed.frames[0].tre_mm == 0.0
+
+
+@pytest.fixture(scope="module")
+def knee() -> KnownSequence:
+    """A simulated knee under an instrument, four frames of it."""
+    return render_test(CaseTest(Case("man", "drilling", "instrument"), 0, 1), 4)
+
+
+@pytest.mark.slow
+def test_a_simulated_bone_is_followed_whatever_the_truth_is_said_to_be(knee) -> None:
+    answers = follow(knee, "bimcc")
+    frames = answers.followed.frames
+    assert [frame.status for frame in frames] == ["OK"] * 3
+    assert all(frame.tre_mm < 0.5 and frame.displacement_mm < 0.5 for frame in frames)
+    misled = follow(replace(knee, truth=[NONSENSE] * 4), "bimcc")
+    for pose, other in zip(answers.poses, misled.poses, strict=True):
+        np.testing.assert_array_equal(pose.matrix, other.matrix)
+    assert all(frame.tre_mm > 20.0 for frame in misled.followed.frames)
+    assert draw_worst_frame(knee, answers)[:2] == b"\xff\xd8"
+
+
+def test_a_simulated_test_knows_where_the_bone_is(knee) -> None:
+    assert knee.stage.name == "drilling"
+    assert len(knee.frames) == len(knee.truth) == 4
+    places = np.array([pose.translation_mm for pose in knee.truth])
+    assert 0.0 < np.linalg.norm(places[-1] - places[0]) < 20.0, "the leg breathes"
+    times_ns = [frame.captured_ns for frame in knee.frames]
+    assert sorted(set(times_ns)) == times_ns
+    assert set(knee.made_steps) <= set(knee.plan.content.steps)
