@@ -11,18 +11,21 @@ Image = NDArray[np.uint8]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StereoFrame:
-    """Two pictures of one instant."""
+    """Two pictures of one instant, or of one sweep of both shutters over their rows."""
 
     # left, right: uint8, (H, W) grey or (H, W, 3) BGR, the same shape, not rectified.
     left: Image
     right: Image
-    captured_ns: int  # mid exposure of the left picture, on the host's monotonic clock
+    # mid exposure of the left picture, of its middle row, on the host's monotonic clock.
+    captured_ns: int
     received_ns: int  # when the driver had both pictures
     skew_ns: int  # capture time of the right picture minus that of the left one
     sequence: int  # counts the frames that the source handed out, strictly increasing
     rig_id: str  # identity of the rig that took them
     # number of the picture in a recorded folder; None for a live camera.
     source_index: int | None = None
+    # a row is exposed later by this than the row above it, in both pictures; 0: all rows at once.
+    row_delay_ns: int = 0
 
     def __post_init__(self) -> None:
         shape = self.left.shape

@@ -50,7 +50,8 @@ class StereoRig:
     """Two cameras and `right_from_left` (x_right = R x_left + t, mm).
 
     Raises:
-        ValueError: cameras of different picture sizes, no baseline, wrong frame names.
+        ValueError: cameras of different picture sizes, no baseline, wrong frame names, a negative
+            row delay.
     """
 
     left: Camera
@@ -59,12 +60,16 @@ class StereoRig:
     serials: tuple[str, str] = ("", "")
     quality: RigQuality | None = None
     name: str = field(default="")
+    # A row of a picture is exposed later by this than the row above it; 0: all rows at once.
+    row_delay_ns: int = 0
 
     def __post_init__(self) -> None:
         if (self.left.width, self.left.height) != (self.right.width, self.right.height):
             raise ValueError("both cameras of a rig need the same picture size")
         if (self.right_from_left.target, self.right_from_left.source) != ("right", "left"):
             raise ValueError("a rig needs the transform right_from_left")
+        if self.row_delay_ns < 0:
+            raise ValueError(f"row_delay_ns is {self.row_delay_ns}, but no row delay is negative")
         if self.baseline_mm < 1e-6:
             raise ValueError("the cameras of a rig stand at the same place: no baseline")
 
@@ -85,7 +90,7 @@ class StereoRig:
 
     @property
     def rig_id(self) -> str:
-        """Hash of the numbers: two rigs with the same geometry have the same id."""
+        """Hash of the geometry's numbers: two rigs with the same geometry have the same id."""
         digest = hashlib.sha256()
         for camera in (self.left, self.right):
             # Absent coefficients are zeros, and adding 0 makes -0 a plain 0.
@@ -98,7 +103,7 @@ class StereoRig:
         return digest.hexdigest()[:12]
 
     def scale(self, factor: float) -> "StereoRig":
-        """The same rig with smaller or larger pictures."""
+        """The same rig with smaller or larger pictures, which take as long to be exposed."""
         return StereoRig(
             self.left.scale(factor),
             self.right.scale(factor),
@@ -106,4 +111,5 @@ class StereoRig:
             self.serials,
             self.quality,
             self.name,
+            round(self.row_delay_ns / factor),
         )

@@ -72,6 +72,7 @@ def read_rig(path: str | Path) -> StereoRig:
             (str(values.get("serial_left", "")), str(values.get("serial_right", ""))),
             _quality(values),
             str(values.get("rig_name", path.stem)),
+            _row_delay_ns(values),
         )
     except (ValueError, TypeError, OverflowError) as error:
         raise RigError(
@@ -101,6 +102,8 @@ def _write_entries(storage: Any, rig: StereoRig) -> None:
     storage.write("serial_right", rig.serials[1])
     if rig.quality is not None:
         _write_quality(storage, rig.quality)
+    if rig.row_delay_ns:
+        storage.write("row_delay_ns", rig.row_delay_ns)
     storage.write("image_width", rig.width)
     storage.write("image_height", rig.height)
     for index, camera in ((1, rig.left), (2, rig.right)):
@@ -161,6 +164,18 @@ def _quality(values: dict[str, Any]) -> RigQuality | None:
     )
 
 
+def _row_delay_ns(values: dict[str, Any]) -> int:
+    """Of a rig whose file says nothing, 0: all rows at once.
+
+    Raises:
+        ValueError: no whole number.
+    """
+    delay_ns = float(values.get("row_delay_ns", 0.0))
+    if not delay_ns.is_integer():
+        raise ValueError(f"row_delay_ns is {delay_ns:g}, not a whole number")
+    return int(delay_ns)
+
+
 def _read_storage(path: Path) -> dict[str, Any]:
     """Every known entry of an OpenCV storage file, under our names."""
     import cv2
@@ -201,6 +216,6 @@ def _read_scalars(storage: Any) -> dict[str, Any]:
         if size.size != 2:
             raise ValueError(f"{name} is not a width and a height")
         values["image_width"], values["image_height"] = size
-    names = ("image_width", "image_height", "accepted", "uncertainty_mm")
+    names = ("image_width", "image_height", "accepted", "uncertainty_mm", "row_delay_ns")
     values |= read_numbers(storage, names)
     return values | read_texts(storage, _TEXTS) | read_record(storage)

@@ -131,3 +131,40 @@ def test_a_rig_is_good_to_the_end_of_its_last_day() -> None:
     assert not QUALITY.has_expired(date(2026, 8, 28))
     assert QUALITY.has_expired(date(2026, 8, 29))
     assert not RigQuality(True).has_expired(date(2099, 1, 1))
+
+
+def test_the_delay_of_a_row_comes_back_and_is_written_only_where_there_is_one(
+    tmp_path: Path,
+) -> None:
+    path, plain = tmp_path / "rolling.yml", tmp_path / "plain.yml"
+    rolling = dataclasses.replace(judged_rig(), row_delay_ns=20_862)
+    write_rig(path, rolling)
+    again = read_rig(path)
+    assert again.row_delay_ns == 20_862
+    # The identity is the geometry's.
+    assert again.rig_id == judged_rig().rig_id
+    write_rig(plain, judged_rig())
+    assert "row_delay" not in plain.read_text(encoding="utf-8")
+    assert read_rig(plain).row_delay_ns == 0
+
+
+@pytest.mark.parametrize("value", [-5.0, 0.5, float("nan")])
+def test_an_impossible_row_delay_is_refused_by_name(tmp_path: Path, value: float) -> None:
+    path = tmp_path / "rig.yml"
+    write_rig(path, toed_in_rig())
+    text = without_seal(path.read_text(encoding="utf-8"))
+    shown = ".Nan" if value != value else f"{value}"
+    path.write_text(text.replace("image_width:", f"row_delay_ns: {shown}\nimage_width:"))
+    with pytest.raises(RigError, match="row_delay_ns"):
+        read_rig(path)
+
+
+def without_seal(text: str) -> str:
+    """As a person would write the file: without the hash, and the name that needs it."""
+    lines = text.splitlines()
+    return "\n".join(one for one in lines if "sha256" not in one and "rig_id" not in one) + "\n"
+
+
+def test_smaller_pictures_have_fewer_rows_that_take_as_long() -> None:
+    rolling = dataclasses.replace(judged_rig(), row_delay_ns=20_000)
+    assert rolling.scale(0.5).row_delay_ns == 40_000
