@@ -21,9 +21,10 @@ from navapp.errors import (
     UnsupportedControl,
 )
 from navapp.geometry.rig import StereoRig
+from sim_devices.exposure import Shutter, expose
 from sim_devices.faults import FaultKind, FaultScript
 from sim_devices.rigs import NO_TURN, Turn
-from sim_devices.sensor import Eye, SensorModel
+from sim_devices.sensor import Eye, Rows, SensorModel
 
 NOMINAL_EXPOSURE_MS = 8.0
 
@@ -42,17 +43,30 @@ class Scene(Protocol):
         ...
 
     def render(
-        self, eye: Eye, time_ns: int, scale: float = 1.0, turn_rad: Turn = NO_TURN
+        self,
+        eye: Eye,
+        time_ns: int,
+        scale: float = 1.0,
+        turn_rad: Turn = NO_TURN,
+        rows: Rows | None = None,
     ) -> NDArray[np.float32]:
         """(H, W, 3) float32 BGR radiance at a world time, 1.0 = full well at nominal exposure.
 
-        The right eye is turned about its own axes by the rotation vector `turn_rad`.
+        The right eye is turned about its own axes by the rotation vector `turn_rad`. With `rows`
+        only these need be right.
         """
+        ...
+
+    def path_px(self, from_ns: int, until_ns: int) -> float:
+        """The longest way that anything goes in the left picture (full size) in an interval."""
         ...
 
 
 class SimulatedCamera:
     """Renders a stereo pair at every exposure instant, a multiple of the frame period.
+
+    The instant is mid exposure of the middle row. With a row delay of the world's rig each row is
+    exposed at its own time; with `is_blurred` it gathers light for as long as it is exposed.
 
     Stepped, `read` takes the instants one by one and moves the clock to each of them. Otherwise the
     camera runs by itself: `read` takes the next instant that is not past, so that a slow reader
@@ -72,6 +86,7 @@ class SimulatedCamera:
         scale: float = 1.0,
         sensor: SensorModel | None = None,
         faults: FaultScript | None = None,
+        is_blurred: bool = False,
         skew_ns: int = 0,
         unstamped_skew_ns: int = 0,
         n_frames: int | None = None,
@@ -86,15 +101,20 @@ class SimulatedCamera:
             scale: of the pictures, against those of the world's rig.
             sensor: of both eyes; its exposure is that of `NOMINAL_EXPOSURE_MS`.
             faults: what goes wrong, none when absent.
+            is_blurred: whether what moves during the exposure is blurred.
             skew_ns: how much later the right eye exposes.
             unstamped_skew_ns: how much later it exposes on top of that, unknown to its frames.
             n_frames: the sequence ends after so many, None for never.
 
         Raises:
-            ValueError: a rate or scale that is not positive.
+            ValueError: a rate or scale that is not positive, or rows that are exposed for longer
+                than a frame period.
         """
         if not (rate_hz > 0.0 and scale > 0.0):
             raise ValueError("rate and scale of a camera must be positive")
+        rolling_ns = world.rig.row_delay_ns * (world.rig.height - 1)
+        if rolling_ns > 0 and rolling_ns + NOMINAL_EXPOSURE_MS * 1e6 > 1e9 / rate_hz:
+            raise ValueError("shutter and exposure of a camera must fit into its frame period")
         self._world = world
         self._clock = clock
         self._is_stepped = is_stepped
@@ -103,6 +123,7 @@ class SimulatedCamera:
         self._rig = world.rig if scale == 1.0 else world.rig.scale(scale)
         self._nominal_sensor = sensor or SensorModel()
         self._faults = faults or FaultScript()
+        self._is_blurred = is_blurred
         self._skew_ns = skew_ns
         self._true_skew_ns = skew_ns + unstamped_skew_ns
         self._n_frames = n_frames
@@ -200,7 +221,7 @@ class SimulatedCamera:
     def set(self, control: str, value: float) -> float:
         """Set `exposure_ms` or `gain_db`, in steps of 0.1; both survive a reopening."""
         limits = {
-            "exposure_ms": (_CONTROL_STEP, 1000.0 / self._rate_hz),
+            "exposure_ms": (_CONTROL_STEP, self._longest_exposure_ms),
             "gain_db": (0.0, _LARGEST_GAIN_DB),
         }
         if control not in limits:
@@ -224,6 +245,17 @@ class SimulatedCamera:
         """Stop; a reader in another thread gets a `DeviceLost`."""
         with self._lock:
             self._opening += self._opening % 2
+
+    @property
+    def _longest_exposure_ms(self) -> float:
+        """Beside the shutter's way over the rows."""
+        return 1000.0 / self._rate_hz - self._shutter.rolling_ns * 1e-6
+
+    @property
+    def _shutter(self) -> Shutter:
+        """As the exposure is set now."""
+        exposure_ns = round(self._controls["exposure_ms"] * 1e6) if self._is_blurred else 0
+        return Shutter(exposure_ns, self._rig.row_delay_ns, self._rig.height)
 
     def world_time_ns(self, captured_ns: int) -> int:
         """World time of a capture time of the left eye, for a `TruthOracle`.
@@ -254,7 +286,7 @@ class SimulatedCamera:
             self._next_instant += 1
             exposed_ns = self._instant_ns(self._next_instant)
         delay_ns = self._faults.delay_ns(exposed_ns) + max(0, self._true_skew_ns)
-        return exposed_ns, exposed_ns + delay_ns
+        return exposed_ns, exposed_ns + delay_ns + self._shutter.total_ns // 2
 
     def _instant_ns(self, number: int) -> int:
         return round(number * 1e9 / self._rate_hz)
@@ -306,6 +338,7 @@ class SimulatedCamera:
             skew_ns=self._skew_ns,
             sequence=self._sequence,
             rig_id=self._rig.rig_id,
+            row_delay_ns=self._rig.row_delay_ns,
         )
 
     def _picture(self, eye: Eye, world_time_ns: int) -> Image:
@@ -313,13 +346,25 @@ class SimulatedCamera:
         if self._faults.is_active(blackout, world_time_ns):
             radiance = np.zeros((self._rig.height, self._rig.width, 3), np.float32)
         else:
-            turn_rad = self._faults.turn_rad(world_time_ns)
-            radiance = self._world.render(eye, world_time_ns, self._scale, turn_rad)
+            radiance = self._radiance(eye, world_time_ns)
         controls = self._controls
         sensor = self._nominal_sensor.with_exposure(
             controls["exposure_ms"] / NOMINAL_EXPOSURE_MS, controls["gain_db"]
         )
         return sensor.picture(radiance, eye, self._sequence)
+
+    def _radiance(self, eye: Eye, middle_ns: int) -> NDArray[np.float32]:
+        """Of the picture of which the middle row is at mid exposure then."""
+        turn_rad, shutter = self._faults.turn_rad(middle_ns), self._shutter
+        if shutter.total_ns == 0:
+            return self._world.render(eye, middle_ns, self._scale, turn_rad)
+
+        def render(time_ns: int, rows: Rows | None) -> NDArray[np.float32]:
+            return self._world.render(eye, time_ns, self._scale, turn_rad, rows)
+
+        half_ns = shutter.total_ns // 2
+        path_px = self._scale * self._world.path_px(middle_ns - half_ns, middle_ns + half_ns)
+        return expose(render, shutter, path_px, middle_ns)
 
 
 def _make_closed_error() -> DeviceLost:

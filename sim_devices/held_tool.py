@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from navapp.geometry.camera import Camera
 from navapp.geometry.transform import FloatArray, RigidTransform
 from sim_devices.camera import Scene
+from sim_devices.picture_motion import compute_path_px
 from sim_devices.pixel_rays import centre_rays
 from sim_devices.rigs import NO_TURN, Turn, camera_from_left
-from sim_devices.sensor import Eye
+from sim_devices.sensor import Eye, Rows
 from sim_devices.sheet import SheetScene
 from sim_devices.tool_shapes import ToolShape
 
@@ -57,10 +58,15 @@ class ToolInView:
         ]
 
     def render(
-        self, eye: Eye, time_ns: int, scale: float = 1.0, turn_rad: Turn = NO_TURN
+        self,
+        eye: Eye,
+        time_ns: int,
+        scale: float = 1.0,
+        turn_rad: Turn = NO_TURN,
+        rows: Rows | None = None,
     ) -> NDArray[np.float32]:
         """(H, W, 3) BGR linear radiance; 1.0 is a full well at nominal exposure."""
-        radiance = self._behind.render(eye, time_ns, scale, turn_rad)
+        radiance = self._behind.render(eye, time_ns, scale, turn_rad, rows)
         pose = self._pose(time_ns)
         if pose is None:
             return radiance
@@ -72,6 +78,22 @@ class ToolInView:
         for number in range(len(self._faces)):
             self._draw_face(number, eye, scale, camera, eye_from_tool, radiance)
         return radiance
+
+    def path_px(self, from_ns: int, until_ns: int) -> float:
+        """Of tip, shaft and faces of the tool, and of what is behind it."""
+        behind_px, first = self._behind.path_px(from_ns, until_ns), self._pose(from_ns)
+        if first is None:
+            return behind_px
+
+        def pose(time_ns: int) -> RigidTransform:
+            return self._pose(time_ns) or first
+
+        shape = self._shape
+        ends = [shape.tip_mm[None], (shape.tip_mm - shape.shaft_mm * shape.axis)[None]]
+        for sheet, turned in zip(shape.faces, shape.tool_from_faces, strict=True):
+            ends.append(RigidTransform("tool", "face", turned).apply(sheet.corners_mm))
+        points_mm = np.concatenate(ends)
+        return max(behind_px, compute_path_px(self.rig.left, points_mm, pose, from_ns, until_ns))
 
     def _draw_face(
         self,

@@ -12,7 +12,7 @@ from drivers.interfaces import DisplayInfo
 from navapp.geometry.rig import StereoRig
 from sim_devices.display import SimulatedDisplay
 from sim_devices.rigs import NO_TURN, Turn, make_default_rig
-from sim_devices.sensor import Eye
+from sim_devices.sensor import Eye, Rows
 
 # Radiance of the wall behind, and of a white display.
 _WALL, _WHITE = 0.06, 0.5
@@ -119,7 +119,12 @@ class DisplayInView:
         self._origin_ns = origin_ns
 
     def render(
-        self, eye: Eye, time_ns: int, scale: float = 1.0, turn_rad: Turn = NO_TURN
+        self,
+        eye: Eye,
+        time_ns: int,
+        scale: float = 1.0,
+        turn_rad: Turn = NO_TURN,
+        rows: Rows | None = None,
     ) -> NDArray[np.float32]:
         """(H, W, 3) BGR linear radiance; 1.0 is a full well at nominal exposure."""
         from_ns = self._origin_ns + time_ns - self._exposure_ns // 2
@@ -134,3 +139,7 @@ class DisplayInView:
         left, right = (round((share - shift) * rig.width) for share in _COLUMNS)
         picture[top:bottom, left:right] = _WALL + _WHITE * light
         return picture
+
+    def path_px(self, from_ns: int, until_ns: int) -> float:
+        """Nothing moves; a picture's light is gathered in `render` already."""
+        return 0.0

@@ -14,6 +14,7 @@ from navapp.geometry.transform import RigidTransform
 from sim_devices.materials import MaterialId
 from sim_devices.pixel_rays import centre_rays
 from sim_devices.raster_kernels import project_vertices, raster_triangles
+from sim_devices.sensor import Rows
 from sim_devices.shading_kernels import shade
 from sim_devices.textures import COARSE_VOXEL_MM, FINE_VOXEL_MM, NoiseTile
 
@@ -108,7 +109,7 @@ class Renderer:
         camera: with its distortion.
         parts: of the scene.
         surfaces: lamps, materials, noise.
-        static_bodies: bodies whose pose never changes; they are drawn once and kept.
+        static_bodies: bodies whose pose seldom changes; they are kept as drawn until it does.
 
     `render` and `depth` may be called from several threads; calls wait for each other.
     """
@@ -131,12 +132,19 @@ class Renderer:
         self._inverse_depth = np.zeros(shape, dtype=np.float32)
         self._triangle = np.full(shape, -1, dtype=np.int32)
         self._background: tuple[FloatImage, FloatImage, NDArray[np.int32]] | None = None
+        self._background_poses = np.zeros(0)
         self._lock = threading.Lock()
 
     def render(
-        self, poses: Mapping[str, RigidTransform], camera_from_lamps: RigidTransform
+        self,
+        poses: Mapping[str, RigidTransform],
+        camera_from_lamps: RigidTransform,
+        rows: Rows | None = None,
     ) -> FloatImage:
-        """(H, W, 3) float32 BGR radiance; `poses` are camera_from_body of every body."""
+        """(H, W, 3) float32 BGR radiance; `poses` are camera_from_body of every body.
+
+        With `rows` only these are right: the others lack what moves.
+        """
         with self._lock:
             image_kept, inverse_depth_kept, _ = self._render_background(poses, camera_from_lamps)
             image = image_kept.copy()
@@ -148,7 +156,10 @@ class Renderer:
                 # Static surfaces are in the picture already: only moving ones get a triangle.
                 self._triangle[box[1] : box[3], box[0] : box[2]] = -1
                 self._raster(box, static=False)
-                self._shade(box, poses, camera_from_lamps, image)
+                if rows is not None:
+                    box[1], box[3] = max(box[1], rows[0]), min(box[3], rows[1])
+                if box[1] < box[3]:
+                    self._shade(box, poses, camera_from_lamps, image)
             return image
 
     def depth(
@@ -175,8 +186,13 @@ class Renderer:
     def _render_background(
         self, poses: Mapping[str, RigidTransform], camera_from_lamps: RigidTransform
     ) -> tuple[FloatImage, FloatImage, NDArray[np.int32]]:
-        """Picture, z-buffer and triangles of what never moves, drawn at the first call."""
-        if self._background is None:
+        """Picture, z-buffer and triangles of what lies still, drawn anew when it has moved."""
+        still = [
+            poses[part.body].matrix
+            for part, is_static in zip(self._geometry.parts, self._static, strict=True)
+            if is_static
+        ]
+        if self._background is None or not np.array_equal(self._background_poses, still):
             whole = np.array([0, 0, self._camera.width, self._camera.height], dtype=np.int64)
             image = np.zeros((self._camera.height, self._camera.width, 3), dtype=np.float32)
             self._inverse_depth.fill(0.0)
@@ -184,6 +200,7 @@ class Renderer:
             self._project(poses, static=True)
             self._raster(whole, static=True)
             self._shade(whole, poses, camera_from_lamps, image)
+            self._background_poses = np.array(still)
             self._background = (image, self._inverse_depth.copy(), self._triangle.copy())
         return self._background
 

@@ -5,12 +5,16 @@ from typing import Literal, get_args
 
 from navapp.errors import UsageError
 from sim_devices.anatomy import AgeGroup, KneeSpec, Sex, Side
+from sim_devices.drift import HIGHEST_MM_S
 
 MotionKind = Literal["still", "breathing", "patient", "jump"]
 InstrumentKind = Literal["none", "sweep"]
 
 
-_HIGHEST = {"cartilage_mm": 2.6, "contrast": 0.2, "blood": 1.0, "misses": 2.0}
+_HIGHEST = {
+    "cartilage_mm": 2.6, "contrast": 0.2, "blood": 1.0, "misses": 2.0,
+    "drift_mm_s": HIGHEST_MM_S, "shake_mm": 2.0, "shake_hz": 50.0,
+}  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +42,11 @@ class Scenario:
     blood: float = 0.3  # 0 is dry, 1 is very bloody
     # by how much saw and drill miss their plan: times 1 mm and 1.5 deg (standard deviations).
     misses: float = 1.0
+    # the leg is moved to and fro across the view at this speed (`drift`), 0 to 300.
+    drift_mm_s: float = 0.0
+    # shake_mm, shake_hz: amplitude and frequency of the arm that carries the cameras (`shake`).
+    shake_mm: float = 0.0
+    shake_hz: float = 8.0
 
     def __post_init__(self) -> None:
         for name, highest in _HIGHEST.items():

@@ -11,6 +11,8 @@ from drivers.frames import Image
 from sim_devices.sensor_kernels import expose_rows
 
 Eye = Literal["left", "right"]
+# First row, and the first one after the last.
+Rows = tuple[int, int]
 
 _TABLE_SIZE = 4096
 _NOISE_SIZE = 1 << 19

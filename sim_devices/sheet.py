@@ -10,9 +10,10 @@ from navapp.geometry.camera import Camera
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform
 from sim_devices.camera import Scene
+from sim_devices.picture_motion import compute_path_px
 from sim_devices.pixel_rays import corner_rays
 from sim_devices.rigs import NO_TURN, Turn, camera_from_left, make_default_rig
-from sim_devices.sensor import Eye
+from sim_devices.sensor import Eye, Rows
 from sim_devices.sheet_kernels import draw_sheet
 
 # Radiance of ink, of paper in full light and of the table behind.
@@ -91,7 +92,12 @@ class SheetScene:
         self._levels = _levels(sheet.white)
 
     def render(
-        self, eye: Eye, time_ns: int, scale: float = 1.0, turn_rad: Turn = NO_TURN
+        self,
+        eye: Eye,
+        time_ns: int,
+        scale: float = 1.0,
+        turn_rad: Turn = NO_TURN,
+        rows: Rows | None = None,
     ) -> NDArray[np.float32]:
         """(H, W, 3) BGR linear radiance; 1.0 is a full well at nominal exposure."""
         camera, rays = self._optics(eye, scale)
@@ -101,6 +107,11 @@ class SheetScene:
         if box is not None:
             self._draw(camera, rays, pose, box, picture)
         return np.repeat(picture[:, :, None], 3, axis=2)
+
+    def path_px(self, from_ns: int, until_ns: int) -> float:
+        """How far a corner of the sheet goes in the left picture in an interval."""
+        corners_mm, pose = self._sheet.corners_mm, self._left_from_sheet
+        return compute_path_px(self.rig.left, corners_mm, pose, from_ns, until_ns)
 
     def draw_alone(
         self, eye: Eye, scale: float, camera_from_sheet: RigidTransform
@@ -183,14 +194,24 @@ class SheetInView:
         self._sheet = SheetScene(sheet, left_from_sheet, behind.rig, ground=np.nan)
 
     def render(
-        self, eye: Eye, time_ns: int, scale: float = 1.0, turn_rad: Turn = NO_TURN
+        self,
+        eye: Eye,
+        time_ns: int,
+        scale: float = 1.0,
+        turn_rad: Turn = NO_TURN,
+        rows: Rows | None = None,
     ) -> NDArray[np.float32]:
         """(H, W, 3) BGR linear radiance; 1.0 is a full well at nominal exposure."""
-        radiance = self._behind.render(eye, time_ns, scale, turn_rad)
+        radiance = self._behind.render(eye, time_ns, scale, turn_rad, rows)
         if not self._shown_ns[0] <= time_ns < self._shown_ns[1]:
             return radiance
         sheet = self._sheet.render(eye, time_ns, scale, turn_rad)
         return np.where(np.isnan(sheet), radiance, sheet)
+
+    def path_px(self, from_ns: int, until_ns: int) -> float:
+        """Of the sheet, and of what is behind it."""
+        paths_px = [one.path_px(from_ns, until_ns) for one in (self._behind, self._sheet)]
+        return max(paths_px)
 
 
 def _levels(white: NDArray[np.uint8]) -> list[_Level]:

@@ -19,6 +19,10 @@ class KnowsTruth(Protocol):
         """Pose in the left camera at a world time (0 = start)."""
         ...
 
+    def seen_ns(self, body: str, time_ns: int) -> int:
+        """World time at which the body's own rows of a picture of that time are exposed."""
+        ...
+
     @property
     def record(self) -> OperationRecord:
         """What was really made."""
@@ -47,8 +51,20 @@ class TruthOracle:
         return self._world.bodies
 
     def left_from_body(self, body: str, captured_ns: int) -> RigidTransform:
-        """True pose of a body in the left camera (not rectified, mm) when a frame was captured."""
+        """True pose of a body in the left camera (not rectified, mm) when a frame was captured.
+
+        That is mid exposure of the picture's middle row.
+        """
         return self._world.left_from_body(body, self._world_time_of(captured_ns))
+
+    def left_from_seen_body(self, body: str, captured_ns: int) -> RigidTransform:
+        """True pose of a body when the frame's left picture showed it: what an answer is judged by.
+
+        That is mid exposure of the middle row of the body's box in the left picture. Without a
+        rolling shutter it is the pose at capture.
+        """
+        time_ns = self._world_time_of(captured_ns)
+        return self._world.left_from_body(body, self._world.seen_ns(body, time_ns))
 
     def made_planes(self) -> dict[str, tuple[FloatArray, FloatArray]]:
         """Faces that the saw leaves, made already or not, by the name of their planned cut.

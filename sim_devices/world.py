@@ -19,18 +19,27 @@ from sim_devices.cartilage import (
     wear_patch,
     with_cartilage,
 )
+from sim_devices.drift import compute_drift_mm
 from sim_devices.fitted_parts import FittedParts
 from sim_devices.layout import left_from_table, mirror_pose, misplace, nominal_table_from_femur
 from sim_devices.materials import make_material_table
 from sim_devices.motion import LegMotion, compute_drill_motion, compute_sweep_offset_mm
 from sim_devices.operation import State, enter
 from sim_devices.operation_record import OperationRecord
+from sim_devices.picture_motion import compute_path_px
 from sim_devices.planned_cuts import Cut
 from sim_devices.renderer import DepthPicture, Part, Renderer, Surfaces
-from sim_devices.rigs import NO_TURN, Turn, camera_from_left, make_default_rig
+from sim_devices.rigs import (
+    NO_TURN,
+    WORKING_DISTANCE_MM,
+    Turn,
+    camera_from_left,
+    make_default_rig,
+)
 from sim_devices.scenario import Scenario
 from sim_devices.scenes import Scene, make_scene
-from sim_devices.sensor import Eye
+from sim_devices.sensor import Eye, Rows
+from sim_devices.shake import ArmShake
 from sim_devices.site import Site, make_site
 from sim_devices.state_history import StateHistory
 from sim_devices.textures import make_noise_tile
@@ -40,6 +49,16 @@ _TISSUE_FOLLOWS = 0.9
 _KEPT_STATES = 4
 _DEFECT_RADIUS_MM = 9.0
 _HAND_ABOVE_MM = 32.0
+# What lies in the room and not on the leg.
+_BESIDE_LEG = frozenset({"drape", "hand"})
+# Of the vertices of a part, so many say how fast it moves in the picture.
+_N_WATCHED = 150
+# What moves in the picture only as the rig shakes. It costs half of a picture, and is drawn anew
+# only when it may have moved by so much.
+_STILL = frozenset({"drape"})
+_STILL_STEP_PX = 0.25
+# Of the size of the pictures in which the rows of a body are looked for.
+_COARSE = 0.25
 # Direction in the table's frame (z away from the cameras), strength.
 _LAMPS = np.array(
     [
@@ -83,6 +102,11 @@ class World:
         self._nominal = nominal_table_from_femur()
         self._start = misplace(self._nominal, scenario.seed)
         self._motion = LegMotion(scenario.motion, scenario.seed)
+        self._shake = ArmShake(scenario.shake_mm, scenario.shake_hz, scenario.seed)
+        fastest_px_s = self._shake.compute_speed_px_s(self.rig.left.focal_px, WORKING_DISTANCE_MM)
+        self._still_step_ns = max(
+            1, round(1e9 * _STILL_STEP_PX / max(fastest_px_s, _STILL_STEP_PX))
+        )
         self._site = self._make_site(right)
         self._fitted = FittedParts(self._site)
         self.record = OperationRecord(self._site, self._fitted, is_left=self._is_left)
@@ -158,7 +182,37 @@ class World:
         return self._left_from_body(body, time_ns, self.states.at(time_ns))
 
     def _left_from_body(self, body: str, time_ns: int, state: State) -> RigidTransform:
-        return self._place_in_view(self._table_from_body(body, time_ns / 1e9, state))
+        return self._shake.left_from_rest(time_ns / 1e9) @ self._rest_from_body(
+            body, time_ns, state
+        )
+
+    def _rest_from_body(self, body: str, time_ns: int, state: State) -> RigidTransform:
+        """In the left camera as it stands while nothing shakes."""
+        table_from_body = self._table_from_body(body, time_ns / 1e9, state)
+        drift_mm = compute_drift_mm(self.scenario.drift_mm_s, time_ns / 1e9)
+        if drift_mm != 0.0 and body not in _BESIDE_LEG:
+            twist = np.array([drift_mm, 0.0, 0.0, 0.0, 0.0, 0.0])
+            table_from_body = table_from_body.move(twist, np.zeros(3))
+        return self._place_in_view(table_from_body)
+
+    def seen_ns(self, body: str, time_ns: int) -> int:
+        """When the middle row of a body's box in the left picture is at mid exposure.
+
+        The box holds all of the body that the picture shows of it.
+
+        Args:
+            body: one of `bodies`.
+            time_ns: world time at which the middle row of the picture is.
+        """
+        if self.rig.row_delay_ns == 0:
+            return time_ns
+        picture = self._depth("left", time_ns, _COARSE, self.states.at(time_ns))
+        shows = picture.body == picture.bodies.index(body) if body in picture.bodies else None
+        rows = np.flatnonzero(shows.any(axis=1)) if shows is not None else np.zeros(0)
+        if len(rows) == 0:
+            return time_ns
+        middle = float(0.5 * (rows[0] + rows[-1]) - 0.5 * (len(picture.body) - 1))
+        return time_ns + round(middle / _COARSE * self.rig.row_delay_ns)
 
     def cartilage_mm(self, bone: str) -> FloatArray:
         """(V,) true thickness over the vertices of a bone of the anatomy, worn at the defect.
@@ -180,7 +234,12 @@ class World:
         return dict(self._surfaces_mm())[bone]
 
     def render(
-        self, eye: Eye, time_ns: int, scale: float = 1.0, turn_rad: Turn = NO_TURN
+        self,
+        eye: Eye,
+        time_ns: int,
+        scale: float = 1.0,
+        turn_rad: Turn = NO_TURN,
+        rows: Rows | None = None,
     ) -> NDArray[np.float32]:
         """(H, W, 3) BGR linear radiance; 1.0 is a full well at nominal exposure.
 
@@ -189,16 +248,37 @@ class World:
             time_ns: world time.
             scale: of the picture against the rig's.
             turn_rad: of the right eye, about its own axes.
+            rows: only these need be right; None: all.
         """
         state = self.states.take_picture(time_ns)
         with self._lock:
             renderer = self._renderer(state, eye, scale, turn_rad)
         seen_from = camera_from_left(self.rig, eye, turn_rad)
-        return renderer.render(*self._poses(seen_from, state, time_ns))
+        return renderer.render(*self._poses(seen_from, state, time_ns), rows)
+
+    def path_px(self, from_ns: int, until_ns: int) -> float:
+        """The longest way that anything goes in the left picture (full size) in an interval."""
+        state, longest_px = self._state, 0.0
+        with self._lock:
+            parts = self._scene(state).parts
+        for part in parts:
+            if part.body in _STILL and self._shake.is_still:
+                continue
+            vertices_mm = part.mesh.vertices_mm
+            watched_mm = vertices_mm[:: max(1, len(vertices_mm) // _N_WATCHED)]
+
+            def pose(time_ns: int, body: str = part.body) -> RigidTransform:
+                return self._left_from_body(body, time_ns, state)
+
+            path_px = compute_path_px(self.rig.left, watched_mm, pose, from_ns, until_ns)
+            longest_px = max(longest_px, path_px)
+        return longest_px
 
     def depth(self, eye: Eye, time_ns: int, scale: float = 1.0) -> DepthPicture:
         """True depth and body of every pixel of the picture that `render` gives."""
-        state = self._state
+        return self._depth(eye, time_ns, scale, self._state)
+
+    def _depth(self, eye: Eye, time_ns: int, scale: float, state: State) -> DepthPicture:
         with self._lock:
             renderer = self._renderer(state, eye, scale)
         return renderer.depth(*self._poses(camera_from_left(self.rig, eye), state, time_ns))
@@ -210,13 +290,17 @@ class World:
 
         Args:
             camera: that looks; one that looks often is the same object each time.
-            seen_from: camera_from_left, of where it stands; it never moves.
+            seen_from: camera_from_left while nothing shakes, of where it stands; it never moves.
             time_ns: world time.
         """
         state = self._state
         with self._lock:
             renderer = self._renderer_for(state, camera)
-        return renderer.render(*self._poses(seen_from, state, time_ns))
+        poses = {
+            body: seen_from @ self._rest_from_body(body, time_ns, state)
+            for body in self._bodies_of(state)
+        }
+        return renderer.render(poses, seen_from @ self._left_from_table)
 
     def _renderer(self, state: State, eye: Eye, scale: float, turn_rad: Turn = NO_TURN) -> Renderer:
         """That of an eye as it stands: what lies still is drawn once and kept."""
@@ -237,7 +321,7 @@ class World:
     def _make_renderer(
         self, camera: Camera, parts: tuple[Part, ...], scale: float = 1.0
     ) -> Renderer:
-        return Renderer(camera, parts, self._surfaces_at(scale), frozenset({"drape"}))
+        return Renderer(camera, parts, self._surfaces_at(scale), _STILL)
 
     def _scene(self, state: State) -> Scene:
         """Made at the first call, and kept until others have taken its place."""
@@ -267,11 +351,18 @@ class World:
         self, seen_from: RigidTransform, state: State, time_ns: int
     ) -> tuple[dict[str, RigidTransform], RigidTransform]:
         """camera_from_body of everything in the scene, and camera_from_table."""
+        step_ns = self._still_step_ns
+        still_ns = round(time_ns / step_ns) * step_ns
         poses = {
-            body: seen_from @ self._left_from_body(body, time_ns, state)
-            for body in dict.fromkeys(part.body for part in self._scene(state).parts)
+            body: seen_from
+            @ self._left_from_body(body, still_ns if body in _STILL else time_ns, state)
+            for body in self._bodies_of(state)
         }
-        return poses, seen_from @ self._left_from_table
+        left_from_rest = self._shake.left_from_rest(time_ns / 1e9)
+        return poses, seen_from @ left_from_rest @ self._left_from_table
+
+    def _bodies_of(self, state: State) -> tuple[str, ...]:
+        return tuple(dict.fromkeys(part.body for part in self._scene(state).parts))
 
     def _table_from_body(self, body: str, time_s: float, state: State) -> RigidTransform:
         """As for a right knee."""

@@ -62,6 +62,16 @@ class SimulationSection(Section):
     """The right camera exposes later by this."""
     unstamped_skew_ms: float = 0.0
     """The right camera exposes later by this as well, and its time stamps do not say so."""
+    blur: bool = False
+    """Whether what moves while a picture is exposed (8 ms) is blurred."""
+    shutter_ms: Annotated[float, Field(ge=0.0, le=50.0)] = 0.0
+    """Rolling shutter: the last row is exposed later than the first by this; 0: all at once."""
+    shake_mm: Annotated[float, Field(ge=0.0, le=2.0)] = 0.0
+    """Amplitude with which the arm that carries the cameras shakes; 0: it stands still."""
+    shake_hz: Annotated[float, Field(gt=0.0, le=50.0)] = 8.0
+    """Frequency of the shake."""
+    drift_mm_s: Annotated[float, Field(ge=0.0, le=300.0)] = 0.0
+    """Speed at which the leg is moved to and fro across the view, on top of its motion; 0: not."""
     grey: bool = False
     """Grey pictures, like those of an OAK camera."""
     board_s: Annotated[tuple[NotNegative, Positive], AfterValidator(check_rising)] | None = None

@@ -17,7 +17,7 @@ from navapp.devices.simulated_room import (
     Pace,
     Simulation,
     make_simulated_camera,
-    scenario_of,
+    make_world,
     simulation_of,
     with_board,
     with_tool,
@@ -84,7 +84,8 @@ def _open_simulated(
     configuration: Configuration, board: Board | None, *, is_headless: bool
 ) -> tuple[OpenedDevices, World, SimulatedCamera]:
     settings = configuration.camera.simulated
-    world, pace = World(scenario_of(settings)), Pace.of(settings, is_headless=is_headless)
+    world = make_world(settings, configuration.camera.rate_hz)
+    pace = Pace.of(settings, is_headless=is_headless)
     scene = with_board(with_tool(world, settings), board, settings)
     camera = make_simulated_camera(scene, settings, pace, configuration.camera.rate_hz)
     if configuration.camera.rig is not None:

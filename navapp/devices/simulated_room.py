@@ -1,7 +1,7 @@
 """The simulated room as configured: world, camera, and the truth kept apart from them."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -12,11 +12,13 @@ from drivers.clock import Clock, ManualClock, SystemClock
 from navapp.config import FaultSection, SimulationSection
 from navapp.devices.simulated_board import make_hand, print_board
 from navapp.devices.simulated_tool import SIMULATED_PLATES, make_touching
+from navapp.errors import ConfigurationError
 from navapp.geometry import RigidTransform, TriangleMesh
 from navapp.geometry.transform import FloatArray
-from sim_devices.camera import Scene, SimulatedCamera
+from sim_devices.camera import NOMINAL_EXPOSURE_MS, Scene, SimulatedCamera
 from sim_devices.faults import Fault, FaultKind, FaultScript
 from sim_devices.planned_cuts import Cut
+from sim_devices.rigs import make_default_rig
 from sim_devices.scenario import Scenario
 from sim_devices.sensor import SensorModel
 from sim_devices.sheet import SheetInView
@@ -76,7 +78,27 @@ def make_simulated_camera(
         faults=FaultScript(tuple(_fault(section) for section in settings.faults)),
         skew_ns=round(settings.skew_ms * 1e6),
         unstamped_skew_ns=round(settings.unstamped_skew_ms * 1e6),
+        is_blurred=settings.blur,
     )
+
+
+def make_world(settings: SimulationSection, rate_hz: float) -> World:
+    """The room before a rig with the configured shutter.
+
+    Raises:
+        ConfigurationError: shutter and exposure take longer than a frame period.
+    """
+    longest_ms = 1000.0 / rate_hz - NOMINAL_EXPOSURE_MS
+    if settings.shutter_ms > max(longest_ms, 0.0):
+        raise ConfigurationError(
+            f"a shutter of {settings.shutter_ms:g} ms and an exposure of {NOMINAL_EXPOSURE_MS:g} ms"
+            f" do not fit between two pictures at {rate_hz:g} Hz",
+            subject="camera.simulated.shutter_ms",
+            remedy=f"use a shutter_ms of at most {max(longest_ms, 0.0):.3g}, or a lower rate_hz",
+        )
+    rig = make_default_rig()
+    row_delay_ns = round(settings.shutter_ms * 1e6 / (rig.height - 1))
+    return World(scenario_of(settings), replace(rig, row_delay_ns=row_delay_ns))
 
 
 def scenario_of(settings: SimulationSection) -> Scenario:
@@ -90,6 +112,9 @@ def scenario_of(settings: SimulationSection) -> Scenario:
         motion=settings.motion,
         instrument=settings.instrument,
         misses=settings.misses,
+        drift_mm_s=settings.drift_mm_s,
+        shake_mm=settings.shake_mm,
+        shake_hz=settings.shake_hz,
     )
 
 

@@ -10,7 +10,7 @@ from navapp.tools.tool import ToolKind
 from sim_devices.held_tool import Cover, ToolInView
 from sim_devices.printed_plate import PlateLayout
 from sim_devices.rigs import NO_TURN, Turn
-from sim_devices.sensor import Eye
+from sim_devices.sensor import Eye, Rows
 from sim_devices.tool_hand import PivotingHand, Touch, TouchingHand
 from sim_devices.tool_shapes import ToolShape, make_tool
 from sim_devices.world import World
@@ -55,11 +55,20 @@ class Table:
         self.rig = rig
 
     def render(
-        self, eye: Eye, time_ns: int, scale: float = 1.0, turn_rad: Turn = NO_TURN
+        self,
+        eye: Eye,
+        time_ns: int,
+        scale: float = 1.0,
+        turn_rad: Turn = NO_TURN,
+        rows: Rows | None = None,
     ) -> NDArray[np.float32]:
         """(H, W, 3) BGR linear radiance, the same everywhere."""
         rig = self.rig if scale == 1.0 else self.rig.scale(scale)
         return np.full((rig.height, rig.width, 3), _TABLE, np.float32)
+
+    def path_px(self, from_ns: int, until_ns: int) -> float:
+        """Nothing moves."""
+        return 0.0
 
 
 def make_pivoting(

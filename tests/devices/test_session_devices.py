@@ -114,6 +114,22 @@ def test_a_simulated_rig_says_so_by_its_name() -> None:
     opened.devices.close()
 
 
+def test_frames_and_rig_of_a_rolling_shutter_say_how_late_a_row_is() -> None:
+    content = {"camera": {"simulated": {"scale": 0.2, "shutter_ms": 15.0}}}
+    opened = open_live(parse(content, "x"), is_headless=True)
+    frame = opened.devices.camera.read(1.0)
+    opened.devices.close()
+    assert frame.row_delay_ns == opened.rig.row_delay_ns
+    assert frame.row_delay_ns * 720 * 0.2 == pytest.approx(15e6, rel=0.01)
+
+
+def test_a_shutter_that_is_longer_than_a_frame_period_is_refused() -> None:
+    content = {"camera": {"rate_hz": 30.0, "simulated": {"shutter_ms": 26.0}}}
+    with pytest.raises(ConfigurationError, match=r"shutter_ms of at most 25\.3") as caught:
+        open_live(parse(content, "x"), is_headless=True)
+    assert caught.value.subject == "camera.simulated.shutter_ms"
+
+
 def test_a_recording_of_another_size_is_refused(tmp_path) -> None:
     pairs = write_pairs(tmp_path / "pairs", range(2))
     with pytest.raises(RigError, match="48x32"):

@@ -22,6 +22,7 @@ class PlainWorld:
     def __init__(self, width: int = 64, height: int = 48) -> None:
         self.rig = plain_rig(width, height)
         self.bodies = ("femur",)
+        self.speed_px_s = 0.0  # of what `path_px` tells; the picture knows nothing of it
         self.rendered: list[tuple[str, int]] = []
         self.turns_rad: list[Turn] = []
 
@@ -30,8 +31,19 @@ class PlainWorld:
             "left", body, np.eye(3), (0.0, 0.0, 400.0 + time_ns * 1e-9)
         )
 
+    def seen_ns(self, body: str, time_ns: int) -> int:
+        return time_ns
+
+    def path_px(self, from_ns: int, until_ns: int) -> float:
+        return self.speed_px_s * (until_ns - from_ns) * 1e-9
+
     def render(
-        self, eye: str, time_ns: int, scale: float = 1.0, turn_rad: Turn = NO_TURN
+        self,
+        eye: str,
+        time_ns: int,
+        scale: float = 1.0,
+        turn_rad: Turn = NO_TURN,
+        rows: tuple[int, int] | None = None,
     ) -> NDArray[np.float32]:
         self.rendered.append((eye, time_ns))
         self.turns_rad.append(turn_rad)

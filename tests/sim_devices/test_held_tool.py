@@ -25,9 +25,17 @@ class Room:
     rig = RIG
 
     def render(
-        self, eye: str, time_ns: int, scale: float = 1.0, turn_rad: Turn = NO_TURN
+        self,
+        eye: str,
+        time_ns: int,
+        scale: float = 1.0,
+        turn_rad: Turn = NO_TURN,
+        rows: tuple[int, int] | None = None,
     ) -> np.ndarray:
         return np.full((720, 1280, 3), GROUND, np.float32)
+
+    def path_px(self, from_ns: int, until_ns: int) -> float:
+        return 0.25
 
 
 def pose_of(
@@ -189,3 +197,15 @@ def test_what_is_behind_is_not_drawn_over_for_good(shape: ToolShape) -> None:
     scene = ToolInView(Still(), shape, lambda time_ns: pose_of())
     assert scene.render("left", 0).max() > 0.3
     assert (Still.picture == GROUND).all()
+
+
+def test_a_tool_that_moves_is_told_with_what_is_behind_it(shape: ToolShape) -> None:
+    def moving(time_ns: int) -> RigidTransform:
+        return pose_of(place_mm=(20.0 + 1e-6 * time_ns, -5.0, 430.0))
+
+    still = ToolInView(Room(), shape, lambda time_ns: pose_of())
+    assert still.path_px(0, 1_000_000) == 0.25
+    assert ToolInView(Room(), shape, lambda time_ns: None).path_px(0, 1_000_000) == 0.25
+    path_px = ToolInView(Room(), shape, moving).path_px(0, 1_000_000)
+    # 1 mm; the faces are up to some centimetres nearer or farther than the first one's origin.
+    assert path_px == pytest.approx(RIG.left.focal_px / 430.0, rel=0.25)

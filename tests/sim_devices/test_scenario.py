@@ -21,6 +21,9 @@ from sim_devices.scenario import Scenario
         {"instrument": "saw"},
         {"contrast": 0.3},
         {"blood": 1.1},
+        {"drift_mm_s": 300.5},
+        {"shake_mm": 2.1},
+        {"shake_hz": -8.5},
     ],
 )
 def test_an_impossible_scenario_is_refused_in_our_words(values):
@@ -36,3 +39,6 @@ def test_what_the_configuration_allows_the_simulator_can_do():
             Scenario(**{name: value})
     highest = next(limit.le for limit in fields["cartilage_mm"].metadata if hasattr(limit, "le"))
     assert Scenario(cartilage_mm=highest).cartilage_mm == 2.6
+    for name in ("drift_mm_s", "shake_mm", "shake_hz"):
+        highest = next(limit.le for limit in fields[name].metadata if hasattr(limit, "le"))
+        assert getattr(Scenario(**{name: highest}), name) == highest

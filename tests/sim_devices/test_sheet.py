@@ -137,3 +137,21 @@ def test_a_sheet_hides_what_is_behind_it_while_it_is_held() -> None:
     # Where the sheet ends is no more than a pixel's work.
     beside = cv2.erode(is_behind[:, :, 0].astype(np.uint8), np.ones((5, 5), np.uint8)) > 0
     assert (alone[beside] == np.float32(0.08)).all()
+
+
+def test_a_sheet_that_moves_is_told_with_what_is_behind_it() -> None:
+    class Slow:
+        rig = make_default_rig()
+
+        def path_px(self, from_ns: int, until_ns: int) -> float:
+            return 0.25
+
+    def moving(time_ns: int) -> RigidTransform:
+        return RigidTransform.from_parts("left", "sheet", np.eye(3), (1e-6 * time_ns, 0.0, 450.0))
+
+    expected_px = Slow.rig.left.focal_px / 450.0
+    sheet = SheetScene(sheet_of(), moving)
+    assert sheet.path_px(0, 1_000_000) == pytest.approx(expected_px)
+    moves = SheetInView(Slow(), sheet_of(), moving, (0, 20))
+    assert moves.path_px(0, 1_000_000) == pytest.approx(expected_px)
+    assert SheetInView(Slow(), sheet_of(), lambda t: moving(0), (0, 20)).path_px(0, 9) == 0.25
