@@ -49,6 +49,8 @@ SITUATIONS: dict[SituationName, Situation] = {
     "patient": Situation("the patient moves", "patient", "none"),
     "instrument": Situation("an instrument moves, the leg breathes", "breathing", "sweep"),
 }
+# When the simulated instrument begins and ceases to lie before the bone, in every six seconds.
+INSTRUMENT_S = (1.8, 4.2)
 STAGE_NAMES = tuple(stage.name for stage in STAGES)
 # As the paper's tables have them: its state of the art, its proposal; then ours.
 METHODS: tuple[Method, ...] = ("icp", "paper", "bimcc")

@@ -10,7 +10,7 @@ from typing import Any
 
 from navapp import __version__
 from navapp.evaluation.campaign import CampaignFolder, CampaignSettings, Done
-from navapp.evaluation.cases import Case
+from navapp.evaluation.cases import INSTRUMENT_S, Case
 from navapp.evaluation.report import make_report
 from navapp.evaluation.rows import Row, make_row
 from navapp.evaluation.summary import Judged, compare_with_paper, judge_method
@@ -50,11 +50,15 @@ def _of(case: Case, done: Sequence[Done]) -> list[Done]:
 
 
 def _about(settings: CampaignSettings, done: Sequence[Done]) -> list[str]:
+    seconds = settings.n_frames / settings.tests[0].configure().camera.rate_hz
     return [
         f"navapp {__version__}, Python {platform.python_version()}, {platform.machine()}, "
         f"{os.cpu_count()} cores",
         f"{len(done)} of {len(settings.tests)} tests, each another knee, {settings.n_frames} "
         f"frames each after the registration; first seed {settings.first_seed}",
+        f"these frames are {seconds:.1f} s of the room; an instrument that moves comes before the "
+        f"bone {INSTRUMENT_S[0]:g} s after the start of a test and is gone after "
+        f"{INSTRUMENT_S[1]:g} s: a shorter test has only the beginning of that, or nothing",
         "age changes the fine relief of the simulated bones only: 0.10 mm (20 to 30) against "
         "0.15 mm (35 to 45), root mean square",
         "simulated devices; research software, not for clinical use",

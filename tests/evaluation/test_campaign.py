@@ -227,6 +227,7 @@ def test_results_are_those_of_the_kept_files(line, tmp_path) -> None:
     assert ours["tre_mm"] == pytest.approx(0.1015)
     assert (ours["seeds"], ours["frames"]) == ([101, 102], 6)
     assert content["summary"]["tests"] == content["summary"]["of"] == 4
+    assert "these frames are 0.2 s of the room" in (tmp_path / "tables.md").read_text()
     lines = (tmp_path / "frames.csv").read_text().splitlines()
     assert len(lines) == 1 + 4 * 2 * 3
     first = dict(zip(lines[0].split(","), lines[1].split(","), strict=True))

@@ -5,17 +5,20 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from navapp.evaluation.cases import (
     ALL_CASES,
     FIRST_SEED,
+    INSTRUMENT_S,
     MOST_TESTS,
     SAMPLES,
     SITUATIONS,
     STAGE_NAMES,
     list_tests,
 )
+from sim_devices.motion import SWEEP_PERIOD_S, compute_sweep_offset_mm
 
 ROOT = Path(__file__).parents[2]
 SEEDS = range(FIRST_SEED, FIRST_SEED + len(ALL_CASES) * MOST_TESTS)
@@ -79,6 +82,18 @@ def test_a_test_configures_its_knee_and_its_situation() -> None:
     )  # fmt: skip
     assert tests["man-drilling-patient-0"].configure().camera.simulated.motion == "patient"
     assert tests["man-drilling-overlay-0"].configure().camera.simulated.instrument == "none"
+
+
+def test_the_instrument_lies_before_the_bone_when_it_is_said_to() -> None:
+    def aside_mm(time_s: float) -> float:
+        return float(np.linalg.norm(compute_sweep_offset_mm("sweep", time_s)))
+
+    first_s, last_s = INSTRUMENT_S
+    # A knee's half width and a hand's are together some 70 mm.
+    assert all(aside_mm(time_s) < 75.0 for time_s in np.arange(first_s, last_s, 0.05))
+    assert aside_mm(first_s - 0.2) > 75.0
+    assert aside_mm(last_s + 0.2) > 75.0
+    assert SWEEP_PERIOD_S == 6.0
 
 
 def integers_of(path: Path) -> Iterator[int]:
