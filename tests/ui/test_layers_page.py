@@ -51,8 +51,11 @@ def test_the_help_page_has_the_legend_of_the_overlay() -> None:
         await pilot.press("question_mark")
         legend = app.screen.query_one(OverlayLegend)
         assert not app.screen.can_view_entire(legend)
-        await pilot.press("pagedown", "pagedown")
-        await pilot.pause(0.5)
+        for _ in range(20):
+            await pilot.press("down", "down")
+            await pilot.pause()
+            if app.screen.can_view_entire(legend):
+                break
         assert app.screen.can_view_entire(legend)
         text = str(legend.render())
         assert all(sign in text and meaning in text for sign, meaning in LEGEND)
