@@ -3,7 +3,7 @@
     left_from_bone(t) = left_from_tracker @ tracker_from_marker(t + offset) @ marker_from_bone
 
 Both frames are constant and unknown, as is the offset. They are solved with the poses under test in
-every other second, and the poses are scored in the seconds between, which the solve never sees.
+one of every two seconds, and the poses are scored in the others, which the solve never sees.
 """
 
 from collections.abc import Sequence
@@ -14,12 +14,13 @@ from numpy.typing import NDArray
 
 from navapp.errors import ResultError
 from navapp.evaluation.other_tracker_start import BonePoses, find_offsets, solve_closed_form
-from navapp.evaluation.tracker_motion import TrackerMotion, split_blocks, to_seconds
+from navapp.evaluation.tracker_motion import TrackerMotion, split_halves, to_seconds
 from navapp.evaluation.truth_files import TrackerTruth
 from navapp.geometry.transform import FloatArray, RigidTransform, rotation_from_vector
 
 # Chosen: below this the frames follow from noise.
-_LEAST_TURN_DEG = 2.0  # root mean square, about the second axis
+_LEAST_TURN_DEG = 1.0  # root mean square, about the second axis
+_MOST_FRAMES_SD_MM = 0.5
 _LEAST_PICTURES, _LEAST_BLOCKS, _LEAST_SCORED = 30, 4, 10
 # Two trackers of one bone agree better than this, or they do not see the same motion.
 _MOST_FIT_MM = 5.0
@@ -88,7 +89,7 @@ def solve_frames(
     truth: TrackerTruth,
     vertices_mm: FloatArray,
 ) -> SolvedFrames:
-    """Solve both frames and the offset on even seconds; the odd ones are to be scored.
+    """Solve both frames and the offset on one half of a recording; the other is to be scored.
 
     Args:
         times_ns: of the recording's pictures.
@@ -100,28 +101,31 @@ def solve_frames(
         ResultError: motion or number of pictures do not determine them, and why.
     """
     since_s = to_seconds(times_ns, int(times_ns[0]))
-    blocks, inner = split_blocks(since_s)
-    given = inner & (blocks % 2 == 0) & np.array([pose is not None for pose in poses])
-    _check_number(given, blocks, len(truth.times_ns))
-    used = _gather(poses, since_s, blocks, given)
+    halves = split_halves(since_s)
+    given = halves.is_to_solve & np.array([pose is not None for pose in poses])
+    _check_number(given, halves.blocks, len(truth.times_ns))
+    used = _gather(poses, since_s, halves.blocks, given)
     _check_turns(used)
     start, unknowns, fit_mm = _choose(_solve_each(used, TrackerMotion(truth), vertices_mm))
     left_from_tracker, marker_from_bone = start.frames_of(unknowns)
     motion, lag_s = start.motion, start.lag_s + float(unknowns[12])
-    scored = np.flatnonzero(inner & (blocks % 2 == 1) & motion.knows(since_s + lag_s))
+    scored = np.flatnonzero(halves.is_to_score & motion.knows(since_s + lag_s))
     if len(scored) < _LEAST_SCORED:
         raise _undetermined(f"the tracker knows only {len(scored)} of the pictures to be scored")
     fitted = motion.knows(used.times_s + lag_s)
     covariance = _find_covariance(start, unknowns, used, fitted)
     slopes = _slopes(start, unknowns, since_s[scored])
     variances = np.einsum("rp,pq,rq->r", slopes, covariance, slopes)
+    frames_sd_mm = float(np.sqrt(3.0 * variances.mean()))
+    if frames_sd_mm > _MOST_FRAMES_SD_MM:
+        raise _undetermined(f"they would put the bone off by {frames_sd_mm:.1f} mm (sd)")
     return SolvedFrames(
         left_from_tracker,
         marker_from_bone,
         round(lag_s * 1e9) + motion.origin_ns - int(times_ns[0]),
         float(np.sqrt(covariance[12, 12]) * 1e3),
         fit_mm,
-        float(np.sqrt(3.0 * variances.mean())),
+        frames_sd_mm,
         tuple(int(n) for n in np.flatnonzero(given)[fitted]),
         tuple(int(n) for n in scored),
     )
@@ -196,7 +200,7 @@ def _check_turns(used: BonePoses) -> None:
     if spread_deg[1] < _LEAST_TURN_DEG:
         raise _undetermined(
             f"the bone turns by {spread_deg[0]:.1f} degrees (rms) about one axis and by "
-            f"{spread_deg[1]:.1f} about a second, {_LEAST_TURN_DEG:g} are needed"
+            f"{spread_deg[1]:.1f} about a second, at least {_LEAST_TURN_DEG:g} is needed"
         )
 
 

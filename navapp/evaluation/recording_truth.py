@@ -31,15 +31,16 @@ def _describe_kind(studied: Studied) -> list[str]:
     if solved is None:
         raise AssertionError("another tracker's frames are solved before a report")
     return [
-        f"Poses of another tracker. Its frames and its clock were solved with "
-        f"{len(solved.solved_with)} OK poses of `{studied.leading}` in every other second, and "
-        f"the errors are those in the {len(solved.scored)} pictures of the seconds between, which "
-        "the solve never saw.",
+        "Poses of another tracker. Its frames and its clock were solved with "
+        f"{len(solved.solved_with)} OK poses of `{studied.leading}` in one of every two seconds; "
+        f"the errors are those in {len(solved.scored)} pictures of the other seconds, which the "
+        "solve never saw.",
         f"Its clock reads {solved.offset_ns / 1e6:.1f} ms more than the recording's (sd "
         f"{solved.offset_sd_ms:.1f} ms); {solved.fit_mm:.3f} mm are left in the middle one of the "
         "pictures that were solved with; the solved frames alone put the bone off by "
         f"{solved.frames_sd_mm:.3f} mm (sd) in the scored ones.",
-        "The errors contain those of the other tracker, and are an upper bound in that sense. "
+        "The errors contain those of the other tracker, and are an upper bound in that sense; "
+        "fewer of them lie within the predicted bound than of the navigation's own. "
         "An error of the poses under test that is the same throughout the recording, on the bone "
         "or in the camera, is taken up by the solved frames: this truth cannot show it. Touched "
         "points can.",

@@ -1,6 +1,7 @@
 """Poses of another tracker between its samples, and the halves of a recording."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,9 +11,10 @@ from navapp.geometry.transform import FloatArray
 
 # A marker that was not seen for longer than this is not known in between.
 _MOST_GAP_S = 0.15
-# The recording is cut into blocks of a second, in turns for solving and for scoring. What lies so
-# near to a border belongs to neither: tracking makes neighbouring frames alike.
+# The recording is cut into blocks of a second. What lies so near to a border is neither solved with
+# nor scored: tracking makes neighbouring frames alike.
 _BLOCK_S, _GUARD_S = 1.0, 0.1
+_DRAWING_SEED = 7
 
 
 class TrackerMotion:
@@ -63,13 +65,27 @@ def to_seconds(times_ns: Sequence[int], origin_ns: int) -> FloatArray:
     return since_s
 
 
-def split_blocks(times_s: FloatArray) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """Block of each time (N,), and whether it lies far enough from the borders to count.
+@dataclass(frozen=True, slots=True, eq=False)
+class Halves:
+    """What each picture of a recording is for."""
 
-    Even blocks are for solving, odd ones for scoring. Both halves see the whole motion: a split in
-    the middle would not.
+    blocks: NDArray[np.int64]  # (N,) the second that it lies in
+    is_to_solve: NDArray[np.bool_]  # (N,)
+    is_to_score: NDArray[np.bool_]  # (N,)
+
+
+def split_halves(since_s: FloatArray) -> Halves:
+    """Of every two seconds one is to solve with and one to score, drawn in the same way every time.
+
+    So both halves see the whole motion: of a split in the middle that would not be true, nor of
+    seconds in strict turns when the bone moves to and fro in two seconds.
+
+    Args:
+        since_s: (N,) from the first picture on.
     """
-    since_s = times_s - times_s[0]
     blocks = np.floor(since_s / _BLOCK_S).astype(np.int64)
     into_s = since_s - blocks * _BLOCK_S
-    return blocks, (into_s >= _GUARD_S) & (into_s <= _BLOCK_S - _GUARD_S)
+    is_inner = (into_s >= _GUARD_S) & (into_s <= _BLOCK_S - _GUARD_S)
+    drawn = np.random.default_rng(_DRAWING_SEED).integers(0, 2, int(blocks[-1]) // 2 + 1)
+    is_first = blocks % 2 == drawn[blocks // 2]
+    return Halves(blocks, is_inner & is_first, is_inner & ~is_first)

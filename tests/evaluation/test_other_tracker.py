@@ -5,7 +5,7 @@ import pytest
 
 from navapp.errors import ResultError
 from navapp.evaluation.other_tracker import SolvedFrames, find_poses, solve_frames
-from navapp.evaluation.tracker_motion import TrackerMotion, split_blocks
+from navapp.evaluation.tracker_motion import TrackerMotion, split_halves
 from navapp.evaluation.truth_files import TrackerTruth
 from tests.evaluation.tracked_twice import (
     CENTRE_MM,
@@ -80,12 +80,13 @@ def test_the_solve_never_sees_the_half_that_is_scored() -> None:
     solved = solve(data)
     rng = np.random.default_rng(5)
     since_s = (data.truth.times_ns - OFFSET_NS - data.times_ns[0]) * 1e-9
-    odd = np.floor(since_s).astype(int) % 2 == 1
+    halves = split_halves((np.array(data.times_ns) - data.times_ns[0]) * 1e-9)
+    blocks = np.floor(since_s).astype(int)
+    scored = np.isin(blocks, np.unique(halves.blocks[halves.is_to_score]))
     matrices = data.truth.matrices.copy()
-    matrices[odd, :3, 3] += rng.normal(0.0, 3.0, (int(odd.sum()), 3))
+    matrices[scored, :3, 3] += rng.normal(0.0, 3.0, (int(scored.sum()), 3))
     poses = list(data.poses)
-    blocks, _ = split_blocks((np.array(data.times_ns) - data.times_ns[0]) * 1e-9)
-    for n in np.flatnonzero(blocks % 2 == 1):
+    for n in np.flatnonzero(~halves.is_to_solve):
         poses[n] = data.true[n].move([4.0, -3.0, 2.0, 0.1, 0.0, 0.0], np.zeros(3))
     changed = replace(data, poses=poses, truth=replace(data.truth, matrices=matrices))
     again = solve(changed)
@@ -111,14 +112,14 @@ def test_what_the_tracker_did_not_see_is_not_scored() -> None:
     truth = TrackerTruth(data.truth.times_ns[kept], data.truth.matrices[kept])
     solved = solve(replace(data, truth=truth))
     seconds = {n // 15 for n in solved.scored}
-    assert {9, 15} <= seconds
-    assert not seconds & {11, 13}
+    assert len(seconds) >= 12
+    assert not seconds & {11, 12, 13}
 
 
 @pytest.mark.parametrize(
     ("data", "words"),
     [
-        (lambda: track_twice(hinging), "about a second, 2 are needed"),
+        (lambda: track_twice(hinging), "about a second, at least 1 is"),
         (lambda: track_twice(lambda s: (np.zeros(3), waving(s)[1])), "about a second"),
         (lambda: track_twice(lambda s: waving(s % 5.0), seconds=30.0), "repeats itself"),
         (lambda: track_twice(seconds=3.0), "are needed"),

@@ -19,6 +19,7 @@ from navapp.evaluation.recording import RecordedFrames, Studied, Study, open_fra
 from navapp.evaluation.recording_report import FILES, check_folder, write_report
 from navapp.evaluation.recording_rows import RecordingRow, make_rows
 from navapp.evaluation.scores import Followed
+from navapp.evaluation.tracker_motion import split_halves, to_seconds
 from navapp.evaluation.truth_files import DivotTruth, OwnError, PoseTruth, Touch, Truth
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import RigidTransform
@@ -156,11 +157,13 @@ def tracked_study(seconds: float = 20.0, **changes) -> tuple[Study, list]:
 def test_errors_by_another_tracker(monkeypatch) -> None:
     given, said = tracked_study()
     # What the judge refuses is not solved with, and is scored all the same.
-    said[20] = ("LOST", said[20][1].move([9.0, 0, 0, 0, 0, 0], np.zeros(3)))
+    since_s = to_seconds(given.frames.times_ns, given.frames.times_ns[0])
+    refused = int(np.flatnonzero(split_halves(since_s).is_to_score)[5])
+    said[refused] = ("LOST", said[refused][1].move([9.0, 0, 0, 0, 0, 0], np.zeros(3)))
     one = studied(monkeypatch, given, bimcc=said)
     row = row_of(one, "bimcc")
     assert one.solved is not None
-    assert 20 + 100 in one.known
+    assert refused + 100 in one.known
     assert one.known == {100 + n for n in one.solved.scored}
     assert len(row.errors_mm) == row.n_known - 1
     assert 0.02 < row.tre_mm < 1.0
