@@ -32,7 +32,7 @@ class RecordedFrames(Sequence[StereoFrame]):
 
     Args:
         source: open, and kept open by who opened it.
-        rig_id: of the rig that took them.
+        rig: that took them.
         rate_hz: where the source has neither times nor a rate.
         on_load: told how many pairs there are, whenever one is loaded.
     """
@@ -40,11 +40,11 @@ class RecordedFrames(Sequence[StereoFrame]):
     def __init__(
         self,
         source: RecordedSource,
-        rig_id: str,
+        rig: StereoRig,
         rate_hz: float,
         on_load: Callable[[int], None] = lambda n_frames: None,
     ) -> None:
-        self._source, self._rig_id, self._on_load = source, rig_id, on_load
+        self._source, self._rig, self._on_load = source, rig, on_load
         self.numbers = source.numbers
         period_ns = 1e9 / (source.rate_hz or rate_hz)
         times = source.times
@@ -65,7 +65,8 @@ class RecordedFrames(Sequence[StereoFrame]):
         skew_ns = 0 if times is None else times[place].skew_ns
         return StereoFrame(
             left, right, captured_ns, captured_ns + max(skew_ns, 0), skew_ns,
-            sequence=number, rig_id=self._rig_id, source_index=number,
+            sequence=number, rig_id=self._rig.rig_id, source_index=number,
+            row_delay_ns=self._rig.row_delay_ns,
         )  # fmt: skip
 
 
@@ -81,7 +82,7 @@ def open_frames(
     """
     opened = open_source(source)
     try:
-        frames = RecordedFrames(opened, rig.rig_id, rate_hz, on_load)
+        frames = RecordedFrames(opened, rig, rate_hz, on_load)
         height, width = frames[0].left.shape[:2]
         if (width, height) != (rig.width, rig.height):
             raise RigError(

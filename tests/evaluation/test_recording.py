@@ -54,7 +54,7 @@ class GreySource:
 
 
 def a_study(source: GreySource, truth: Truth, plan=PLAN) -> Study:
-    frames = RecordedFrames(source, "rig", 15.0)
+    frames = RecordedFrames(source, RIG, 15.0)
     prior = Prior({"femur": a_pose()})
     return Study("bench/1", frames, truth, Configuration(), RIG, plan, prior, STAGES[0])
 
@@ -217,14 +217,14 @@ def test_another_folder_is_left_alone(tmp_path) -> None:
 
 def test_pairs_are_loaded_when_they_are_asked_for() -> None:
     source, told = GreySource(4, [10, 20, 35, 50]), []
-    frames = RecordedFrames(source, "rig", 15.0, told.append)
+    frames = RecordedFrames(source, RIG, 15.0, told.append)
     assert len(frames) == 4
     assert source.loaded == []
     frame = frames[2]
     assert (frame.captured_ns, frame.skew_ns, frame.index) == (35, 2_000_000, 102)
     assert source.loaded == [2]
     assert told == [4]
-    assert RecordedFrames(GreySource(3), "rig", 10.0).times_ns == (0, 100_000_000, 200_000_000)
+    assert RecordedFrames(GreySource(3), RIG, 10.0).times_ns == (0, 100_000_000, 200_000_000)
 
 
 def test_pictures_of_another_rig_are_refused(tmp_path) -> None:
