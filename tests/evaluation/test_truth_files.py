@@ -1,4 +1,5 @@
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -157,6 +158,13 @@ def test_a_truth_must_fit_the_recording(tmp_path) -> None:
     with pytest.raises(InputError, match="nothing of the tibia") as error:
         check_truth(truth, "t.json", range(13), "tibia")
     assert "femur" in error.value.remedy
+
+
+def test_the_examples_of_the_page_are_what_they_say(tmp_path) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "phantom-study.md").read_text("utf-8")
+    examples = re.findall(r"^```json\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    kinds = [type(read_truth(written(tmp_path, example))) for example in examples]
+    assert kinds == [PoseTruth, TrackerTruth, DivotTruth]
 
 
 def test_phantoms_have_their_truth_beside_them(data) -> None:
