@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
-from navapp.errors import ResultError, UsageError
+from navapp.errors import ResultError, SequenceError, UsageError
 
 if TYPE_CHECKING:
     from navapp.cli.session_folder import RecordedSession
@@ -98,6 +98,12 @@ def run_recording(
 def _list_sequences(options: argparse.Namespace) -> list[_Sequence]:
     """The recording itself, or those in the folder."""
     path = Path(options.recording)
+    if not path.exists() and "," not in options.recording:
+        raise SequenceError(
+            f"there is no recording {path}",
+            subject=str(path),
+            remedy="give a session folder, a folder of pairs, or two videos LEFT,RIGHT",
+        )
     inner = sorted(found.parent for found in path.glob(f"*/{_TRUTH}")) if path.is_dir() else []
     with_both = [one for one in inner if (one / _PRIOR).is_file()]
     if with_both:

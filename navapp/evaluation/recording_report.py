@@ -3,6 +3,7 @@
 import base64
 import csv
 import io
+import os
 import platform
 from collections.abc import Sequence
 from html import escape
@@ -11,7 +12,7 @@ from typing import Any
 
 from calibration.report.page import make_html, make_note
 from navapp import __version__
-from navapp.errors import UsageError
+from navapp.errors import InputError, UsageError
 from navapp.evaluation.recording import Studied
 from navapp.evaluation.recording_charts import draw_errors_beside_bounds, draw_errors_over_frames
 from navapp.evaluation.recording_rows import RecordingRow, make_rows
@@ -43,9 +44,17 @@ def check_folder(folder: str | Path) -> Path:
     """A folder for the results.
 
     Raises:
-        UsageError: it holds anything but results of this kind, or cannot be made.
+        UsageError: it holds anything but results of this kind.
+        InputError: nothing can be written there.
     """
     path = Path(folder)
+    above = next(one for one in (path, *path.absolute().parents) if one.exists())
+    if not above.is_dir() or not os.access(above, os.W_OK):
+        raise InputError(
+            f"{folder} cannot be written, because of {above}",
+            subject=str(folder),
+            remedy="name a folder for --out in one that you may write to",
+        )
     if path.is_dir() and {one.name for one in path.iterdir()} <= set(FILES):
         return path
     if path.exists():

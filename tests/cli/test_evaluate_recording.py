@@ -129,6 +129,7 @@ def test_a_replay_tells_the_error_of_every_frame(plan, recordings, tmp_path, cap
         (("--allow-unaccepted",), 2, "--allow-unaccepted is of a recording"),
         (("--recording", "x", "--seed", "3"), 2, "--seed is of simulated knees"),
         (("--recording", "x", "--stages", "opening"), 2, "--stages is of simulated knees"),
+        (("--recording", "nowhere", "--truth", "t"), 3, "there is no recording nowhere"),
         (("--recording", "x"), 2, "nothing says where the bone was in x"),
         (("--recording", "x", "--truth", "t", "--fps", "0"), 2, "0 Hz"),
         (("--recording", "x", "--truth", "t"), 2, "no plan is given"),
@@ -136,7 +137,9 @@ def test_a_replay_tells_the_error_of_every_frame(plan, recordings, tmp_path, cap
         (("--recording", "x", "--truth", "t.json", "--plan", "p", "--rig", "r"), 3, "truth t.json"),
     ],
 )
-def test_what_does_not_fit_is_refused(tmp_path, capsys, words, code, told) -> None:
+def test_what_does_not_fit_is_refused(tmp_path, capsys, monkeypatch, words, code, told) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "x").mkdir()
     assert evaluate(*words, "--out", tmp_path / "out") == code
     (line,) = capsys.readouterr().err.strip().splitlines()
     assert told in line

@@ -12,7 +12,7 @@ import pytest
 from drivers.recorded_sources import RecordedTimes
 from navapp.config import Configuration
 from navapp.control.stages import STAGES
-from navapp.errors import ResultError, RigError, UsageError
+from navapp.errors import InputError, ResultError, RigError, UsageError
 from navapp.evaluation import recording
 from navapp.evaluation.following import Answers
 from navapp.evaluation.recording import RecordedFrames, Studied, Study, open_frames, study
@@ -207,6 +207,12 @@ def test_the_report_says_what_another_tracker_can_show(monkeypatch, tmp_path) ->
     tables = (tmp_path / "tables.md").read_text("utf-8")
     for words in ("upper bound", "the solve never saw", "taken up by the solved frames"):
         assert words in tables
+
+
+def test_a_folder_that_cannot_be_made_is_refused_at_once(tmp_path) -> None:
+    (tmp_path / "file").write_text("x")
+    with pytest.raises(InputError, match="cannot be written"):
+        check_folder(tmp_path / "file" / "out")
 
 
 def test_another_folder_is_left_alone(tmp_path) -> None:
