@@ -64,6 +64,7 @@ class ReplayCamera:
         settings: ReplaySettings = ReplaySettings(),
         *,
         rig_id: str = "",
+        row_delay_ns: int = 0,
     ) -> None:
         """Set up; nothing is read before `open`.
 
@@ -72,11 +73,12 @@ class ReplayCamera:
             clock: moved to each capture time.
             settings: how it is walked through.
             rig_id: of the rig that took the pictures.
+            row_delay_ns: of that rig.
         """
         self._source_name = str(source)
         self._clock = clock
         self._settings = settings
-        self._rig_id = rig_id
+        self._rig_id, self._row_delay_ns = rig_id, row_delay_ns
         self._source: RecordedSource | None = None
         self._places: Iterator[int] = iter(())
         self._size = (0, 0)
@@ -159,6 +161,7 @@ class ReplayCamera:
             sequence=self._sequence(self._source.numbers[place]),
             rig_id=self._rig_id,
             source_index=self._source.numbers[place],
+            row_delay_ns=self._row_delay_ns,
         )
         self._last_place = place
         self._n_read += 1

@@ -213,7 +213,7 @@ def _tre_mm(result: "FrameResult", session: LiveSession) -> dict[str, float | No
     for stage, tracked in answers:
         pose = None if tracked is None else tracked.left_from_bone
         if pose is not None and stage.bone in simulation.oracle.bodies:
-            true = simulation.oracle.left_from_body(stage.bone, result.frame.captured_ns)
+            true = simulation.oracle.left_from_seen_body(stage.bone, result.frame.captured_ns)
             targets = plan.targets_of(stage.targets)
             errors_mm[stage.bone] = compute_mean_tre_mm(pose, true, plan.bones[stage.bone], targets)
     return errors_mm

@@ -11,7 +11,7 @@ from navapp.devices import open_live
 from navapp.devices.simulated_plan import make_built_in_plan, make_nominal_prior
 from navapp.evaluation.cases import CaseTest
 from navapp.geometry.rig import StereoRig
-from navapp.geometry.transform import RigidTransform
+from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.values import Plan, Prior, StageSpec
 
 
@@ -20,7 +20,7 @@ class KnownSequence:
     """Frames, what a session needs to follow the bone in them, and where it really was."""
 
     frames: Sequence[StereoFrame]
-    # Left camera from bone at the capture of each frame; None where nobody knows. It is read after
+    # Left camera from bone when each frame showed it; None where nobody knows. It is read after
     # a method has answered, and given to none.
     truth: Sequence[RigidTransform | None]
     configuration: Configuration
@@ -30,11 +30,17 @@ class KnownSequence:
     stage: StageSpec
     made_steps: tuple[str, ...] = ()  # of the plan, made before the first frame
     is_simulated: bool = True
+    # (N, 3) where the stage's targets really are in the bone; None: where the plan has them.
+    true_targets_mm: FloatArray | None = None
 
 
 def render_test(test: CaseTest, n_frames: int) -> KnownSequence:
-    """The pictures of a simulated test; the stage is shown as it is usually entered."""
-    configuration = test.configure()
+    """The pictures of a simulated test."""
+    return render_room(test.configure(), test.case.stage, n_frames)
+
+
+def render_room(configuration: Configuration, stage_name: str, n_frames: int) -> KnownSequence:
+    """The pictures of a simulated room; the stage is shown as it is usually entered."""
     with ExitStack() as undo:
         opened = open_live(configuration, is_headless=True)
         undo.callback(opened.devices.close)
@@ -42,11 +48,11 @@ def render_test(test: CaseTest, n_frames: int) -> KnownSequence:
         if simulation is None:
             raise AssertionError("the configuration of a test names the simulated camera")
         plan = make_built_in_plan(simulation)
-        stage = plan.stage(stage_by_name(test.case.stage))
+        stage = plan.stage(stage_by_name(stage_name))
         made = simulation.states.set_stage(stage.name)
         frames = [opened.devices.camera.read(1.0) for _ in range(n_frames)]
         truth = [
-            simulation.oracle.left_from_body(stage.bone, frame.captured_ns) for frame in frames
+            simulation.oracle.left_from_seen_body(stage.bone, frame.captured_ns) for frame in frames
         ]
         return KnownSequence(
             frames,

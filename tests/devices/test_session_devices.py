@@ -136,6 +136,15 @@ def test_a_recording_of_another_size_is_refused(tmp_path) -> None:
         open_recording(str(pairs), ReplaySettings(), plain_rig(), Configuration())
 
 
+def test_recorded_frames_have_the_row_delay_of_their_rig(tmp_path) -> None:
+    pairs = write_pairs(tmp_path / "pairs", range(1))
+    rig = replace(plain_rig(48, 32), row_delay_ns=20_862)
+    opened = open_recording(str(pairs), ReplaySettings(), rig, Configuration())
+    frame = opened.devices.camera.read(1.0)
+    opened.devices.close()
+    assert frame.row_delay_ns == 20_862
+
+
 def test_an_unknown_backend_is_refused(tmp_path, monkeypatch) -> None:
     announce(monkeypatch, [])
     with pytest.raises(ConfigurationError, match="no camera backend 'acme'"):
