@@ -62,6 +62,14 @@ class DepthPicture:
     body: NDArray[np.int16]  # (H, W) int16 index into `bodies`; -1 where nothing is seen
     bodies: tuple[str, ...]  # names
 
+    def find_middle_row(self, body: str) -> float:
+        """Of the box that holds what is seen of a body, against the picture's; 0: unseen."""
+        index = self.bodies.index(body) if body in self.bodies else len(self.bodies)
+        rows = np.flatnonzero((self.body == index).any(axis=1))
+        if len(rows) == 0:
+            return 0.0
+        return float(0.5 * (rows[0] + rows[-1]) - 0.5 * (len(self.body) - 1))
+
 
 class _Geometry:
     """The parts of a scene in one set of arrays."""

@@ -3,6 +3,7 @@
 import threading
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -207,12 +208,8 @@ class World:
         if self.rig.row_delay_ns == 0:
             return time_ns
         picture = self._depth("left", time_ns, _COARSE, self.states.at(time_ns))
-        shows = picture.body == picture.bodies.index(body) if body in picture.bodies else None
-        rows = np.flatnonzero(shows.any(axis=1)) if shows is not None else np.zeros(0)
-        if len(rows) == 0:
-            return time_ns
-        middle = float(0.5 * (rows[0] + rows[-1]) - 0.5 * (len(picture.body) - 1))
-        return time_ns + round(middle / _COARSE * self.rig.row_delay_ns)
+        rows = picture.find_middle_row(body) / _COARSE
+        return time_ns + round(rows * self.rig.row_delay_ns)
 
     def cartilage_mm(self, bone: str) -> FloatArray:
         """(V,) true thickness over the vertices of a bone of the anatomy, worn at the defect.
@@ -262,16 +259,12 @@ class World:
         with self._lock:
             parts = self._scene(state).parts
         for part in parts:
-            if part.body in _STILL and self._shake.is_still:
-                continue
-            vertices_mm = part.mesh.vertices_mm
-            watched_mm = vertices_mm[:: max(1, len(vertices_mm) // _N_WATCHED)]
-
-            def pose(time_ns: int, body: str = part.body) -> RigidTransform:
-                return self._left_from_body(body, time_ns, state)
-
-            path_px = compute_path_px(self.rig.left, watched_mm, pose, from_ns, until_ns)
-            longest_px = max(longest_px, path_px)
+            if part.body not in _STILL or not self._shake.is_still:
+                vertices_mm = part.mesh.vertices_mm
+                watched_mm = vertices_mm[:: max(1, len(vertices_mm) // _N_WATCHED)]
+                pose = partial(self._left_from_body, part.body, state=state)
+                path_px = compute_path_px(self.rig.left, watched_mm, pose, from_ns, until_ns)
+                longest_px = max(longest_px, path_px)
         return longest_px
 
     def depth(self, eye: Eye, time_ns: int, scale: float = 1.0) -> DepthPicture:
