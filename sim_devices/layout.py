@@ -27,11 +27,11 @@ def select_side(bone: TriangleMesh, level_mm: float, sign: float) -> TriangleMes
     return TriangleMesh(bone.vertices_mm, bone.faces[beyond[bone.faces].all(axis=1)], bone.normals)
 
 
-def left_from_table(rig: StereoRig) -> RigidTransform:
+def left_from_table(rig: StereoRig, distance_mm: float = WORKING_DISTANCE_MM) -> RigidTransform:
     """The table's frame: halfway between the cameras' axes, at the working distance."""
     left_from_right = rig.right_from_left.inverse()
     half_turn = rotation_from_vector(0.5 * vector_from_rotation(left_from_right.rotation))
-    origin = 0.5 * left_from_right.translation_mm + half_turn @ (0.0, 0.0, WORKING_DISTANCE_MM)
+    origin = 0.5 * left_from_right.translation_mm + half_turn @ (0.0, 0.0, distance_mm)
     return RigidTransform.from_parts("left", "table", half_turn, origin)
 
 

@@ -213,6 +213,15 @@ _TABLE: dict[MaterialId, Material] = {
     ),
 }
 
+# What is as wet as the site is.
+_WET = (
+    MaterialId.BONE,
+    MaterialId.CARTILAGE,
+    MaterialId.SPONGY_BONE,
+    MaterialId.TISSUE,
+    MaterialId.SAWN_BONE,
+)
+
 # Which surfaces blood runs on, and how much more readily than on bone.
 _BLOODY = {
     MaterialId.BONE: 0.30,
@@ -227,12 +236,15 @@ _BLOODY = {
 }
 
 
-def make_material_table(contrast: float, blood: float) -> NDArray[np.float32]:
+def make_material_table(
+    contrast: float, blood: float, highlights: float = 1.0
+) -> NDArray[np.float32]:
     """(materials, columns) float32 for the shading kernel.
 
     Args:
         contrast: RMS over mean of the grey levels on bone in the finished picture.
         blood: 0 dry to 1 very bloody.
+        highlights: area of the wet highlights of bone and tissue, times the usual one; 0: none.
     """
     from scipy.special import ndtri
 
@@ -246,6 +258,13 @@ def make_material_table(contrast: float, blood: float) -> NDArray[np.float32]:
                 contrast_fine=1.72 * contrast,
                 contrast_coarse=1.22 * contrast,
                 pores=2.7 * contrast,
+            )
+        if name in _WET:
+            # The area of a highlight goes with one over its narrowness.
+            material = replace(
+                material,
+                specular=material.specular if highlights > 0.0 else 0.0,
+                shininess=material.shininess / max(highlights, 1.0 / 16.0),
             )
         covered = blood * _BLOODY.get(name, 0.0)
         if covered > 1e-4:

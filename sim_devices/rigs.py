@@ -22,7 +22,9 @@ TOE_IN_DEG = 2.5
 
 
 @lru_cache(maxsize=4)
-def make_default_rig(width: int = NATIVE_WIDTH, height: int = NATIVE_HEIGHT) -> StereoRig:
+def make_default_rig(
+    width: int = NATIVE_WIDTH, height: int = NATIVE_HEIGHT, baseline_mm: float = BASELINE_MM
+) -> StereoRig:
     """Two slightly unequal cameras, 80 mm apart, each turned inwards by 2.5 deg.
 
     Another picture size is the same rig with its pictures resized.
@@ -36,7 +38,7 @@ def make_default_rig(width: int = NATIVE_WIDTH, height: int = NATIVE_HEIGHT) -> 
     rig = StereoRig(
         _camera(1402.6, 1403.1, 634.2, 364.8, (-0.102, 0.061, 0.00042, -0.00031, 0.012)),
         _camera(1398.3, 1398.1, 645.9, 355.7, (-0.098, 0.055, -0.00027, 0.00038, 0.015)),
-        _right_from_left(),
+        _right_from_left(baseline_mm),
         ("SIM-L", "SIM-R"),
         name="sim:rig",
     )
@@ -58,7 +60,7 @@ def _camera(
     return Camera(matrix, np.array(distortion), NATIVE_WIDTH, NATIVE_HEIGHT)
 
 
-def _right_from_left() -> RigidTransform:
+def _right_from_left(baseline_mm: float) -> RigidTransform:
     """Both cameras converge; the right one hangs a little high, rolled and behind."""
     turn = math.radians(2.0 * TOE_IN_DEG)
     rotation = rotation_from_vector((math.radians(0.25), turn, math.radians(-0.3)))
@@ -66,5 +68,5 @@ def _right_from_left() -> RigidTransform:
     # by the left camera's own toe-in.
     half = 0.5 * turn
     centre = np.array([math.cos(half), 0.008, math.sin(half)])
-    centre *= BASELINE_MM / np.linalg.norm(centre)
+    centre *= baseline_mm / np.linalg.norm(centre)
     return RigidTransform.from_parts("right", "left", rotation, -rotation @ centre)

@@ -6,6 +6,7 @@ from typing import Literal, get_args
 from navapp.errors import UsageError
 from sim_devices.anatomy import AgeGroup, KneeSpec, Sex, Side
 from sim_devices.drift import HIGHEST_MM_S
+from sim_devices.rigs import WORKING_DISTANCE_MM
 
 MotionKind = Literal["still", "breathing", "patient", "jump"]
 InstrumentKind = Literal["none", "sweep"]
@@ -13,8 +14,11 @@ InstrumentKind = Literal["none", "sweep"]
 
 _HIGHEST = {
     "cartilage_mm": 2.6, "contrast": 0.2, "blood": 1.0, "misses": 2.0,
-    "drift_mm_s": HIGHEST_MM_S, "shake_mm": 2.0, "shake_hz": 50.0,
+    "drift_mm_s": HIGHEST_MM_S, "shake_mm": 2.0, "shake_hz": 50.0, "highlights": 32.0,
+    "distance_mm": 1000.0,
 }  # fmt: skip
+# 0 of all others.
+_LOWEST = {"distance_mm": 200.0}
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +44,8 @@ class Scenario:
     # of the bone's texture (RMS of grey levels divided by their mean), 0.03 to 0.08.
     contrast: float = 0.05
     blood: float = 0.3  # 0 is dry, 1 is very bloody
+    highlights: float = 1.0  # area of the wet highlights, times the usual one; 0 is matt, up to 32
+    distance_mm: float = WORKING_DISTANCE_MM  # of the table from the rig, 200 to 1000
     # by how much saw and drill miss their plan: times 1 mm and 1.5 deg (standard deviations).
     misses: float = 1.0
     # the leg is moved to and fro across the view at this speed (`drift`), 0 to 300.
@@ -50,9 +56,10 @@ class Scenario:
 
     def __post_init__(self) -> None:
         for name, highest in _HIGHEST.items():
-            value = getattr(self, name)
-            if not 0.0 <= value <= highest:
-                raise UsageError(f"{name} is {value:g}", subject=name, remedy=f"use 0 to {highest}")
+            value, lowest = getattr(self, name), _LOWEST.get(name, 0.0)
+            if not lowest <= value <= highest:
+                remedy = f"use {lowest:g} to {highest}"
+                raise UsageError(f"{name} is {value:g}", subject=name, remedy=remedy)
         for name, kind in (("motion", MotionKind), ("instrument", InstrumentKind)):
             value = getattr(self, name)
             if value not in get_args(kind):

@@ -32,7 +32,6 @@ from sim_devices.planned_cuts import Cut
 from sim_devices.renderer import DepthPicture, Part, Renderer, Surfaces
 from sim_devices.rigs import (
     NO_TURN,
-    WORKING_DISTANCE_MM,
     Turn,
     camera_from_left,
     make_default_rig,
@@ -99,12 +98,12 @@ class World:
         right = {
             name: mirror_mesh(mesh) if self._is_left else mesh for name, mesh in self._surfaces_mm()
         }
-        self._left_from_table = left_from_table(self.rig)
+        self._left_from_table = left_from_table(self.rig, scenario.distance_mm)
         self._nominal = nominal_table_from_femur()
         self._start = misplace(self._nominal, scenario.seed)
         self._motion = LegMotion(scenario.motion, scenario.seed)
         self._shake = ArmShake(scenario.shake_mm, scenario.shake_hz, scenario.seed)
-        fastest_px_s = self._shake.compute_speed_px_s(self.rig.left.focal_px, WORKING_DISTANCE_MM)
+        fastest_px_s = self._shake.compute_speed_px_s(self.rig.left.focal_px, scenario.distance_mm)
         self._still_step_ns = max(
             1, round(1e9 * _STILL_STEP_PX / max(fastest_px_s, _STILL_STEP_PX))
         )
@@ -112,7 +111,7 @@ class World:
         self._fitted = FittedParts(self._site)
         self.record = OperationRecord(self._site, self._fitted, is_left=self._is_left)
         self._surfaces = Surfaces(
-            make_material_table(scenario.contrast, scenario.blood),
+            make_material_table(scenario.contrast, scenario.blood, scenario.highlights),
             make_noise_tile(scenario.seed),
             _LAMPS if not self._is_left else _LAMPS * (-1.0, 1.0, 1.0, 1.0),
         )

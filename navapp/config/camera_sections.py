@@ -52,6 +52,26 @@ class SimulationSection(Section):
     """What passes in front of the bone."""
     tool: Literal["none", "pointer", "drill"] = "none"
     """Held into the view: its tip touches places on the femur, one after the other."""
+    contrast: Annotated[float, Field(ge=0.0, le=0.2)] = 0.05
+    """Of the bone's texture: standard deviation of its grey levels over their mean."""
+    blood: Annotated[float, Field(ge=0.0, le=1.0)] = 0.3
+    """0: dry; 1: very bloody."""
+    highlights: Annotated[float, Field(ge=0.0, le=32.0)] = 1.0
+    """Area of the wet highlights, times the usual one; 0: matt."""
+    covered: Annotated[float, Field(ge=0.0, le=0.95)] = 0.0
+    """Share of the bone behind a cloth, from the second picture on; 0: no cloth."""
+    distance_mm: Annotated[float, Field(ge=200.0, le=1000.0)] = 450.0
+    """Of the knee from the cameras."""
+    baseline_mm: Annotated[float, Field(ge=20.0, le=300.0)] = 80.0
+    """Distance of the two cameras."""
+    light: Annotated[float, Field(gt=0.0, le=32.0)] = 1.0
+    """On the sensors, times the usual light."""
+    full_well_e: Annotated[float, Field(ge=50.0)] = 20000.0
+    """Electrons of a saturated pixel: the fewer, the more noise."""
+    read_noise_e: NotNegative = 7.0
+    """Standard deviation of the noise of reading a pixel, electrons."""
+    defocus_px: Annotated[float, Field(ge=0.0, le=20.0)] = 0.5
+    """Standard deviation of the lenses' blur, px of the picture; usual is a sharp one."""
     misses: Annotated[float, Field(ge=0.0, le=2.0)] = 1.0
     """By how much saw and drill miss their plan: times 1 mm and 1.5 deg (standard deviations)."""
     scale: Annotated[float, Field(gt=0.0, le=1.0)] = 1.0

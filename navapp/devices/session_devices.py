@@ -12,6 +12,7 @@ from navapp.config import Configuration
 from navapp.devices.cameras import make_real_camera
 from navapp.devices.peripherals import make_device_set
 from navapp.devices.rig_match import make_reopener, open_matching, read_configured_rig
+from navapp.devices.simulated_cloth import with_cloth
 from navapp.devices.simulated_mirror import make_look
 from navapp.devices.simulated_room import (
     Pace,
@@ -86,7 +87,8 @@ def _open_simulated(
     settings = configuration.camera.simulated
     world = make_world(settings, configuration.camera.rate_hz)
     pace = Pace.of(settings, is_headless=is_headless)
-    scene = with_board(with_tool(world, settings), board, settings)
+    covered = with_cloth(with_tool(world, settings), world, settings)
+    scene = with_board(covered, board, settings)
     camera = make_simulated_camera(scene, settings, pace, configuration.camera.rate_hz)
     if configuration.camera.rig is not None:
         rig = read_configured_rig(configuration)

@@ -74,11 +74,23 @@ def make_simulated_camera(
         is_stepped=pace.is_stepped,
         rate_hz=rate_hz,
         scale=settings.scale,
-        sensor=SensorModel(seed=settings.seed, is_grey=settings.grey),
+        sensor=make_sensor(settings),
         faults=FaultScript(tuple(_fault(section) for section in settings.faults)),
         skew_ns=round(settings.skew_ms * 1e6),
         unstamped_skew_ns=round(settings.unstamped_skew_ms * 1e6),
         is_blurred=settings.blur,
+    )
+
+
+def make_sensor(settings: SimulationSection) -> SensorModel:
+    """What both eyes have behind their lenses."""
+    return SensorModel(
+        full_well_e=settings.full_well_e,
+        read_noise_e=settings.read_noise_e,
+        psf_sigma_px=settings.defocus_px,
+        exposure=settings.light,
+        seed=settings.seed,
+        is_grey=settings.grey,
     )
 
 
@@ -96,7 +108,7 @@ def make_world(settings: SimulationSection, rate_hz: float) -> World:
             subject="camera.simulated.shutter_ms",
             remedy=f"use a shutter_ms of at most {max(longest_ms, 0.0):.3g}, or a lower rate_hz",
         )
-    rig = make_default_rig()
+    rig = make_default_rig(baseline_mm=settings.baseline_mm)
     row_delay_ns = round(settings.shutter_ms * 1e6 / (rig.height - 1))
     return World(scenario_of(settings), replace(rig, row_delay_ns=row_delay_ns))
 
@@ -111,6 +123,10 @@ def scenario_of(settings: SimulationSection) -> Scenario:
         cartilage_mm=settings.cartilage_mm,
         motion=settings.motion,
         instrument=settings.instrument,
+        contrast=settings.contrast,
+        blood=settings.blood,
+        highlights=settings.highlights,
+        distance_mm=settings.distance_mm,
         misses=settings.misses,
         drift_mm_s=settings.drift_mm_s,
         shake_mm=settings.shake_mm,
@@ -175,3 +191,10 @@ def simulation_of(world: World, camera: SimulatedCamera) -> Simulation:
         oracle=TruthOracle(world, camera.world_time_ns),
         states=world.states,
     )
+
+
+def find_cartilage_mm(settings: SimulationSection, bone: str) -> FloatArray:
+    """(V,) true thickness over a bone's vertices: for evaluation only."""
+    if settings.cartilage_mm == 0.0:
+        return np.zeros(1)
+    return World(scenario_of(settings)).cartilage_mm(bone)

@@ -25,6 +25,16 @@ def test_the_rig_has_the_promised_size_baseline_and_focal_length():
     assert turned == pytest.approx(2.0 * TOE_IN_DEG, abs=0.1)
 
 
+def test_another_baseline_changes_the_distance_of_the_cameras_and_nothing_else():
+    usual, wide = make_default_rig(), make_default_rig(baseline_mm=120.0)
+    assert wide.baseline_mm == pytest.approx(120.0)
+    np.testing.assert_array_equal(wide.right_from_left.rotation, usual.right_from_left.rotation)
+    np.testing.assert_allclose(
+        wide.right_from_left.translation_mm, 1.5 * usual.right_from_left.translation_mm
+    )
+    assert make_default_rig(baseline_mm=BASELINE_MM).rig_id == usual.rig_id
+
+
 def test_the_cameras_converge():
     rig = make_default_rig()
     axis_of_right = rig.right_from_left.rotation[2]

@@ -24,6 +24,9 @@ from sim_devices.scenario import Scenario
         {"drift_mm_s": 300.5},
         {"shake_mm": 2.1},
         {"shake_hz": -8.5},
+        {"highlights": 33.5},
+        {"distance_mm": 199.5},
+        {"distance_mm": 1000.5},
     ],
 )
 def test_an_impossible_scenario_is_refused_in_our_words(values):
@@ -39,6 +42,11 @@ def test_what_the_configuration_allows_the_simulator_can_do():
             Scenario(**{name: value})
     highest = next(limit.le for limit in fields["cartilage_mm"].metadata if hasattr(limit, "le"))
     assert Scenario(cartilage_mm=highest).cartilage_mm == 2.6
-    for name in ("drift_mm_s", "shake_mm", "shake_hz"):
+    for name in (
+        "drift_mm_s", "shake_mm", "shake_hz", "contrast", "blood", "highlights", "distance_mm",
+    ):  # fmt: skip
         highest = next(limit.le for limit in fields[name].metadata if hasattr(limit, "le"))
         assert getattr(Scenario(**{name: highest}), name) == highest
+        assert fields[name].default == getattr(Scenario(), name) or name == "drift_mm_s"
+    lowest = next(one.ge for one in fields["distance_mm"].metadata if hasattr(one, "ge"))
+    assert Scenario(distance_mm=lowest).distance_mm == lowest
