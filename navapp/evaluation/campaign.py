@@ -5,20 +5,73 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from functools import cache, partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, Protocol, TypeVar
 
 from navapp import __version__
 from navapp.errors import InputError, UsageError
 from navapp.evaluation.cases import Case, CaseTest, list_tests
 from navapp.evaluation.following import follow
 from navapp.evaluation.scores import Followed
-from navapp.evaluation.sequence import render_test
+from navapp.evaluation.sequence import KnownSequence, render_test
 from navapp.evaluation.workers import run_in_processes
 from navapp.evaluation.worst_frame import draw_worst_frame
 from navapp.geometry.whole_files import write_whole
 from navapp.tracking import Method
 
 _SETTINGS, _TESTS, _TIMES, _PICTURES = "settings.json", "tests", "times", "pictures"
+
+
+class KnownTest(Protocol):
+    """One simulated knee and what happens to it."""
+
+    @property
+    def name(self) -> str:
+        """For files."""
+        ...
+
+    @property
+    def seed(self) -> int:
+        """Of the knee, its room and its pictures."""
+        ...
+
+
+T = TypeVar("T", bound=KnownTest)
+
+
+class Campaign(Protocol[T]):
+    """What is run; it is sent to other processes."""
+
+    @property
+    def methods(self) -> tuple[Method, ...]:
+        """That follow every test."""
+        ...
+
+    @property
+    def n_frames(self) -> int:
+        """That count, of each test."""
+        ...
+
+    @property
+    def tests(self) -> tuple[T, ...]:
+        """All of them."""
+        ...
+
+    @property
+    def timed_tests(self) -> tuple[T, ...]:
+        """Those that are run once more, one after the other, for their times."""
+        ...
+
+    def render(self, test: T, n_frames: int) -> KnownSequence:
+        """The pictures of a test: so many that count, after the one that is registered in."""
+        ...
+
+    def __hash__(self) -> int:
+        """The same campaign is warmed up for once."""
+        ...
+
+    def to_json(self) -> dict[str, Any]:
+        """Named values; a folder is of one campaign only."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,16 +104,20 @@ class CampaignSettings:
         """The first of each case; none for a quick look, whose times are those of its tests."""
         return () if self.is_quick else self.tests[:: self.n_tests]
 
+    def render(self, test: CaseTest, n_frames: int) -> KnownSequence:
+        """The pictures of a test, and one before them."""
+        return render_test(test, n_frames + 1)
+
 
 @dataclass(frozen=True, slots=True)
-class Done:
+class Done(Generic[T]):
     """A test with what each method made of it."""
 
-    test: CaseTest
+    test: T
     followed: dict[Method, Followed]
 
 
-class CampaignFolder:
+class CampaignFolder(Generic[T]):
     """Where the results of a campaign are kept, a file a test.
 
     Args:
@@ -72,7 +129,7 @@ class CampaignFolder:
         InputError: it cannot be made, or its settings are damaged.
     """
 
-    def __init__(self, folder: str | Path, settings: CampaignSettings) -> None:
+    def __init__(self, folder: str | Path, settings: Campaign[T]) -> None:
         self.path, self._settings = Path(folder), settings
         wanted, kept = settings.to_json(), self.path / _SETTINGS
         if kept.is_file():
@@ -101,15 +158,15 @@ class CampaignFolder:
             ) from error
         write_whole(kept, (json.dumps(wanted, indent=1) + "\n").encode())
 
-    def file_of(self, test: CaseTest, *, is_timed: bool) -> Path:
+    def file_of(self, test: T, *, is_timed: bool) -> Path:
         """Of a test's results."""
         return self.path / (_TIMES if is_timed else _TESTS) / f"{test.name}.json"
 
-    def picture_of(self, test: CaseTest) -> Path:
+    def picture_of(self, test: T) -> Path:
         """Of a test's worst frame."""
         return self.path / _PICTURES / f"{test.name}.jpg"
 
-    def missing(self, tests: Sequence[CaseTest], *, is_timed: bool) -> list[CaseTest]:
+    def missing(self, tests: Sequence[T], *, is_timed: bool) -> list[T]:
         """Tests that are not done yet.
 
         Raises:
@@ -118,7 +175,7 @@ class CampaignFolder:
         done = {one.test for one in self.read(is_timed=is_timed)}
         return [test for test in tests if test not in done]
 
-    def read(self, *, is_timed: bool) -> Iterator[Done]:
+    def read(self, *, is_timed: bool) -> Iterator[Done[T]]:
         """All that is done, in the order of the tests.
 
         Raises:
@@ -142,8 +199,8 @@ class CampaignFolder:
 
 
 def run_campaign(
-    folder: CampaignFolder,
-    settings: CampaignSettings,
+    folder: CampaignFolder[T],
+    settings: Campaign[T],
     n_processes: int,
     on_progress: Callable[[int, int, str], None],
 ) -> None:
@@ -167,13 +224,11 @@ def run_campaign(
             on_progress(n_done, total, test.name)
 
 
-def run_test(
-    folder: CampaignFolder, settings: CampaignSettings, test: CaseTest, *, is_timed: bool
-) -> None:
+def run_test(folder: CampaignFolder[T], settings: Campaign[T], test: T, *, is_timed: bool) -> None:
     """Render a test and follow it with every method; the file appears when all is done."""
     if is_timed:
-        _warm_up(settings.tests[0], settings.methods)
-    sequence = render_test(test, settings.n_frames + 1)
+        _warm_up(settings)
+    sequence = settings.render(test, settings.n_frames)
     answers = {method: follow(sequence, method) for method in settings.methods}
     if not is_timed and "bimcc" in answers:
         picture = draw_worst_frame(sequence, answers["bimcc"])
@@ -189,10 +244,10 @@ def run_test(
 
 
 @cache
-def _warm_up(test: CaseTest, methods: tuple[Method, ...]) -> None:
+def _warm_up(settings: Campaign[Any]) -> None:
     """Load what a process compiles or reads at its first frames: it belongs to no test's times."""
-    sequence = render_test(test, 3)
-    for method in methods:
+    sequence = settings.render(settings.tests[0], 2)
+    for method in settings.methods:
         follow(sequence, method)
 
 

@@ -15,6 +15,7 @@ def measure_pose(
     targets_mm: FloatArray,
     surface: TriangleMesh,
     geometry: RectifiedGeometry,
+    true_targets_mm: FloatArray | None = None,
 ) -> tuple[float | None, float | None, float | None]:
     """Target registration error, displacement and outline distance of the drawn bone, mm.
 
@@ -25,8 +26,9 @@ def measure_pose(
         targets_mm: (N, 3) of the stage; may be empty (`compute_mean_tre_mm`).
         surface: of the bone as it is drawn.
         geometry: of the rectified pair.
+        true_targets_mm: (N, 3) where the targets really are in the bone; None: as planned.
     """
-    tre_mm = compute_mean_tre_mm(pose, true, bone, targets_mm)
+    tre_mm = compute_mean_tre_mm(pose, true, bone, targets_mm, true_targets_mm)
     drawn = measure_overlay_error(pose, true, surface, geometry)
     if drawn is None:
         return tre_mm, None, None

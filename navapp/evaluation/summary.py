@@ -53,7 +53,7 @@ def find_upper_limit(n_found: int, n_all: int) -> float:
     return float(betaincinv(n_found + 1, n_all - n_found, 0.95))
 
 
-def judge_method(method: Method, done: Sequence[Done]) -> Judged:
+def judge_method(method: Method, done: Sequence[Done[Any]]) -> Judged:
     """Pool all tests of a method.
 
     Frames of one knee are much alike: the limit by knees is the one to be believed.
