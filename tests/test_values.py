@@ -64,6 +64,13 @@ def test_the_predicted_error_of_a_shift_is_its_chi_square_quantile():
     assert bound == pytest.approx(0.1 * np.sqrt(7.815), rel=1e-4)
 
 
+@pytest.mark.parametrize(("level", "quantile"), [(0.5, 2.366), (0.8, 4.642), (0.99, 11.345)])
+def test_the_predicted_error_has_a_level(level, quantile):
+    covariance = np.diag([0.01, 0.01, 0.01, 0, 0, 0])
+    bound = estimate(covariance).predict_tre_mm(np.zeros(3), np.eye(3) * 70, level)
+    assert bound == pytest.approx(0.1 * np.sqrt(quantile), rel=1e-4)
+
+
 def test_the_predicted_error_grows_with_the_distance_from_the_centre():
     covariance = np.diag([0, 0, 0, 1e-4, 1e-4, 1e-4])
     centre = np.array([5.0, 6.0, 7.0])

@@ -154,12 +154,15 @@ class PoseEstimate:
         """The same estimate with one more reason against it."""
         return replace(self, reasons=(*self.reasons, reason))
 
-    def predict_tre_mm(self, centre_mm: FloatArray, targets_mm: FloatArray) -> float:
-        """95 % bound of the mean error over target points of a bone.
+    def predict_tre_mm(
+        self, centre_mm: FloatArray, targets_mm: FloatArray, level: float = 0.95
+    ) -> float:
+        """Bound of the mean error over target points of a bone.
 
         Args:
             centre_mm: (3,) mean of the model's vertices, in bone coordinates.
             targets_mm: (N, 3) in bone coordinates.
+            level: share of errors that it is to hold for.
 
         The mean length is at most the root mean square, whose square is a weighted sum of
         chi-squares: here one chi-square of the same mean and variance (Welch 1938, Satterthwaite
@@ -178,7 +181,7 @@ class PoseEstimate:
         if first <= 0.0:
             return 0.0
         freedom = first**2 / second
-        return float(np.sqrt(first / freedom * chdtri(freedom, 0.05)))
+        return float(np.sqrt(first / freedom * chdtri(freedom, 1.0 - level)))
 
     def predict_covariances(self, centre_mm: FloatArray, points_mm: FloatArray) -> FloatArray:
         """(N, 3, 3) mm^2 in the camera's frame, of points (N, 3) of the bone.
