@@ -1,5 +1,6 @@
 """One method on one sequence: registered once, then followed, and judged against the truth."""
 
+import math
 import time
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -15,17 +16,22 @@ from navapp.control.runner import run_headless
 from navapp.control.specification import specify_session
 from navapp.control.states import SessionState, Snapshot
 from navapp.devices import make_memory_devices
+from navapp.devices.simulated_room import make_sensor
+from navapp.evaluation.noise_limit_frame import measure_budget
 from navapp.evaluation.pose_errors import measure_pose
-from navapp.evaluation.scores import Followed, FrameScore
+from navapp.evaluation.predicted_errors import predict_errors_mm
+from navapp.evaluation.scores import ErrorBudget, Followed, FrameScore
 from navapp.evaluation.sequence import KnownSequence
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.rectification import rectifier_of
 from navapp.geometry.transform import RigidTransform
 from navapp.tracking import Method
-from navapp.values import Status
+from navapp.values import Status, TrackedFrame, Verdict
 
 # A bone that so many searches have not found is not searched for any more.
 _MOST_REGISTRATIONS = 5
+# One frame of so many has its error budget measured, for time alone.
+_BUDGET_EVERY = 5
 
 
 class Follower:
@@ -116,7 +122,8 @@ class _Judge:
         self._n_searches = 0  # that were made before the newest frame
         self._bone = sequence.plan.bones[sequence.stage.bone]
         self._targets_mm = sequence.plan.targets_of(sequence.stage.targets)
-        self._geometry = rectifier_of(sequence.rig).geometry
+        self._rectifier = rectifier_of(sequence.rig)
+        self._geometry = self._rectifier.geometry
         self._scores: list[FrameScore] = []
         self._poses: list[RigidTransform | None] = []
         self._registered_s: float | None = None
@@ -149,7 +156,9 @@ class _Judge:
         place, tracked = len(self._scores), result.tracked
         verdict = None if tracked is None else tracked.verdict
         pose = None if tracked is None else tracked.left_from_bone
-        tre_mm, displacement_mm, outline_mm = self._measure(pose, self._sequence.truth[place])
+        true = self._sequence.truth[place]
+        tre_mm, displacement_mm, outline_mm = self._measure(pose, true)
+        has_budget = verdict is not None and verdict.status is Status.OK
         return FrameScore(
             index=place,
             status=Status.LOST.value if verdict is None else verdict.status.value,
@@ -162,6 +171,36 @@ class _Judge:
             hidden=None if verdict is None else verdict.occluded_fraction,
             total_ms=result.timings.total_ms,
             is_search=is_search,
+            claimed_mm=self._predict(tracked),
+            rms_ratio=_find_rms_ratio(verdict),
+            budget=self._measure_budget(place, pose, true) if has_budget else None,
+        )
+
+    def _predict(self, tracked: TrackedFrame | None) -> tuple[float, ...] | None:
+        if tracked is None or tracked.estimate is None:
+            return None
+        return predict_errors_mm(tracked.estimate, self._bone, self._targets_mm)
+
+    def _measure_budget(
+        self, place: int, pose: RigidTransform | None, true: RigidTransform | None
+    ) -> ErrorBudget | None:
+        """Of one frame of some, of our method, where the sensor is known."""
+        sequence, camera = self._sequence, self._sequence.configuration.camera
+        is_asked = place % _BUDGET_EVERY == 1 and not self._follows_refused
+        is_known = sequence.is_simulated and camera.backend == "simulated"
+        if not (is_asked and is_known) or pose is None or true is None:
+            return None
+        if len(self._targets_mm) == 0:
+            return None
+        return measure_budget(
+            sequence.frames[place],
+            pose,
+            true,
+            self.surface,
+            self._bone.mesh.centroid_mm,
+            self._targets_mm,
+            self._rectifier,
+            make_sensor(camera.simulated),
         )
 
     def _measure(
@@ -169,4 +208,20 @@ class _Judge:
     ) -> tuple[float | None, float | None, float | None]:
         if pose is None or true is None:
             return None, None, None
-        return measure_pose(pose, true, self._bone, self._targets_mm, self.surface, self._geometry)
+        return measure_pose(
+            pose,
+            true,
+            self._bone,
+            self._targets_mm,
+            self.surface,
+            self._geometry,
+            self._sequence.true_targets_mm,
+        )
+
+
+def _find_rms_ratio(verdict: Verdict | None) -> float | None:
+    """Residual of the fit over the expected one."""
+    if verdict is None or verdict.rms_mm is None or not verdict.expected_rms_mm:
+        return None
+    ratio = verdict.rms_mm / verdict.expected_rms_mm
+    return ratio if math.isfinite(ratio) else None

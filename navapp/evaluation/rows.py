@@ -7,12 +7,11 @@ from typing import Any
 import numpy as np
 
 from navapp.evaluation.campaign import Done
-from navapp.evaluation.cases import Case
+from navapp.evaluation.cases import Case, CaseTest
+from navapp.evaluation.resampled_knees import find_mean_interval
 from navapp.evaluation.scores import Followed, FrameScore
 from navapp.tracking import Method
 
-# Of bootstrap intervals over the tests, each with a knee of its own.
-_N_RESAMPLED, _RESAMPLING_SEED = 2000, 20
 # A pose that is called OK and further off than this, and than its bound, is wrong.
 WRONG_MM = 1.0
 
@@ -69,7 +68,9 @@ class Row:
         }
 
 
-def make_row(case: Case, method: Method, done: Sequence[Done], timed: Sequence[Done]) -> Row:
+def make_row(
+    case: Case, method: Method, done: Sequence[Done[CaseTest]], timed: Sequence[Done[CaseTest]]
+) -> Row:
     """Pool the tests of a case.
 
     Args:
@@ -138,15 +139,7 @@ def _resample(
         known = [value for value in values if value is not None]
         sums.append(float(np.sum(known)))
         counts.append(len(known))
-    if sum(count > 0 for count in counts) < 2:
-        return None
-    drawn = np.random.default_rng(_RESAMPLING_SEED).integers(
-        0, len(tests), (_N_RESAMPLED, len(tests))
-    )
-    n_values = np.array(counts)[drawn].sum(axis=1)
-    means = np.array(sums)[drawn].sum(axis=1)[n_values > 0] / n_values[n_values > 0]
-    low, high = np.percentile(means, (2.5, 97.5))
-    return float(low), float(high)
+    return find_mean_interval(sums, counts)
 
 
 def _time(

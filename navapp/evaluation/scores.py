@@ -4,6 +4,20 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any
 
+# Shares of errors that bounds are to hold for.
+LEVELS = (0.5, 0.8, 0.95, 0.99)
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorBudget:
+    """Root mean square errors over the stage's targets, mm, from the least to what was reached."""
+
+    limit_mm: float  # Cramer-Rao bound of the pixels that obey the model
+    # of the estimator that uses each of these pixels as the model says, told which they are.
+    ideal_mm: float
+    matched_mm: float  # of the matcher's disparities, fitted by plain weighted least squares
+    reached_mm: float  # of the method's own pose
+
 
 @dataclass(frozen=True, slots=True)
 class FrameScore:
@@ -21,6 +35,11 @@ class FrameScore:
     hidden: float | None  # share of it that something hides
     total_ms: float  # that the frame took, from rectification to overlay
     is_search: bool = False  # a registration was made in it
+    # bounds for `tre_mm` at `LEVELS` that follow from the pose's covariance alone, without what the
+    # judge adds for plan and rig; None without a pose.
+    claimed_mm: tuple[float, ...] | None = None
+    rms_ratio: float | None = None  # residual of the fit over the expected one
+    budget: ErrorBudget | None = None  # measured in a part of the frames
 
     @property
     def is_ok(self) -> bool:
@@ -39,7 +58,15 @@ class FrameScore:
             KeyError, TypeError: it is none.
         """
         values = {one.name: content[one.name] for one in fields(cls)}
-        return cls(**{**values, "reasons": tuple(values["reasons"])})
+        claimed, budget = values["claimed_mm"], values["budget"]
+        return cls(
+            **{
+                **values,
+                "reasons": tuple(values["reasons"]),
+                "claimed_mm": None if claimed is None else tuple(claimed),
+                "budget": None if budget is None else ErrorBudget(**budget),
+            }
+        )
 
 
 @dataclass(frozen=True, slots=True)

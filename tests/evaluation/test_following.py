@@ -88,6 +88,11 @@ def test_errors_are_those_of_each_frame(script) -> None:
     assert [frame.tre_mm for frame in frames] == pytest.approx(range(1, N))
     assert [frame.displacement_mm for frame in frames] == pytest.approx(range(1, N), abs=1e-6)
     assert [frame.bound_mm for frame in frames] == [0.8] * (N - 1)
+    assert [frame.rms_ratio for frame in frames] == [1.0] * (N - 1)
+    for frame in frames:
+        assert list(frame.claimed_mm) == sorted(set(frame.claimed_mm))
+        # At least the quantiles of the shift alone: 0.1 mm along each of three axes.
+        assert all(np.array(frame.claimed_mm) > 0.1 * np.array([1.53, 2.15, 2.79, 3.36]))
 
 
 @pytest.mark.parametrize(("method", "found"), [("icp", GONE), ("bimcc", GONE), ("bimcc", LOST)])
@@ -204,6 +209,12 @@ def test_a_simulated_bone_is_followed_whatever_the_truth_is_said_to_be(knee) -> 
     frames = answers.followed.frames
     assert [frame.status for frame in frames] == ["OK"] * 3
     assert all(frame.tre_mm < 0.5 and frame.displacement_mm < 0.5 for frame in frames)
+    # This plan and rig are exact: the judge adds nothing to what the covariance says.
+    assert [frame.claimed_mm[2] for frame in frames] == pytest.approx(
+        [frame.bound_mm for frame in frames]
+    )
+    assert [frame.budget is not None for frame in frames] == [True, False, False]
+    assert frames[0].budget.reached_mm >= frames[0].tre_mm
     misled = follow(replace(knee, truth=[NONSENSE] * 4), "bimcc")
     for pose, other in zip(answers.poses, misled.poses, strict=True):
         np.testing.assert_array_equal(pose.matrix, other.matrix)
