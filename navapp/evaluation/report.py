@@ -16,17 +16,24 @@ _PICTURES = (
 )
 
 
-def make_report(tables: str, rows: Sequence[Row], pictures: Mapping[Case, bytes]) -> str:
+def make_report(
+    tables: str,
+    rows: Sequence[Row],
+    pictures: Mapping[Case, bytes],
+    of_the_judge: Sequence[str] = (),
+) -> str:
     """The page; it needs nothing from elsewhere.
 
     Args:
         tables: `tables.md`.
         rows: of all cases and methods.
         pictures: JPEG of the worst frame of each case.
+        of_the_judge: HTML of its charts.
     """
     parts = [render_markdown(tables)]
     parts += ["<h2>Processing time, as the paper's figure 5</h2>", draw_rates(rows)]
     parts += ["<h2>Error, as the paper's figure 6</h2>", draw_errors(rows)]
+    parts += of_the_judge
     parts += ["<h2>Worst frames</h2>", make_note(_PICTURES), _show(pictures, rows)]
     return make_html("Evaluation", parts)
 

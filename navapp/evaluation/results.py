@@ -10,20 +10,24 @@ from typing import Any
 
 from navapp import __version__
 from navapp.evaluation.campaign import CampaignFolder, CampaignSettings, Done
-from navapp.evaluation.cases import INSTRUMENT_S, Case
+from navapp.evaluation.cases import INSTRUMENT_S, Case, CaseTest
+from navapp.evaluation.rejector_findings import JudgeFindings, examine_judge
 from navapp.evaluation.report import make_report
 from navapp.evaluation.rows import Row, make_row
+from navapp.evaluation.scores import LEVELS, FrameScore
 from navapp.evaluation.summary import Judged, compare_with_paper, judge_method
 from navapp.evaluation.tables import make_tables
 from navapp.geometry.whole_files import write_whole
 
 _COLUMNS = (
     "index", "status", "tre_mm", "displacement_mm", "outline_mm", "bound_mm", "seen", "hidden",
-    "total_ms", "is_search",
+    "total_ms", "is_search", "rms_ratio",
 )  # fmt: skip
+_CLAIMED_COLUMNS = tuple(f"claimed_{100.0 * level:.0f}_mm" for level in LEVELS)
+_BUDGET_COLUMNS = ("limit_mm", "ideal_mm", "matched_mm", "reached_mm")
 
 
-def write_results(folder: CampaignFolder, settings: CampaignSettings) -> dict[str, Any]:
+def write_results(folder: CampaignFolder[CaseTest], settings: CampaignSettings) -> dict[str, Any]:
     """Write `tables.md`, `report.html` and `frames.csv` of what is done; the rows for programs."""
     done = list(folder.read(is_timed=False))
     timed = done if settings.is_quick else list(folder.read(is_timed=True))
@@ -34,22 +38,40 @@ def write_results(folder: CampaignFolder, settings: CampaignSettings) -> dict[st
         if _of(case, done)
     ]
     judged = [judge_method(method, done) for method in settings.methods]
-    tables = make_tables(rows, judged, _about(settings, done), is_quick=settings.is_quick)
+    findings = _examine(done)
+    tables = make_tables(
+        rows,
+        judged,
+        _about(settings, done),
+        findings.to_lines(),
+        is_quick=settings.is_quick,
+    )
     write_whole(folder.path / "tables.md", tables.encode())
     pictures = _find_pictures(folder, settings, done)
-    write_whole(folder.path / "report.html", make_report(tables, rows, pictures).encode())
+    report = make_report(tables, rows, pictures, findings.draw())
+    write_whole(folder.path / "report.html", report.encode())
     write_whole(folder.path / "frames.csv", _make_csv(done).encode())
     return {
         "rows": [row.to_json() for row in rows],
-        "summary": _summarise(rows, judged, settings, done),
+        "summary": _summarise(rows, judged, settings, done) | findings.to_json(),
     }
 
 
-def _of(case: Case, done: Sequence[Done]) -> list[Done]:
+def _of(case: Case, done: Sequence[Done[CaseTest]]) -> list[Done[CaseTest]]:
     return [one for one in done if one.test.case == case]
 
 
-def _about(settings: CampaignSettings, done: Sequence[Done]) -> list[str]:
+def _examine(done: Sequence[Done[CaseTest]]) -> JudgeFindings:
+    """Our method alone: the judge was made for it."""
+    knees: dict[str, list[Sequence[FrameScore]]] = {}
+    for one in done:
+        if "bimcc" in one.followed:
+            frames = one.followed["bimcc"].frames
+            knees.setdefault(one.test.case.situation, []).append(frames)
+    return examine_judge(knees)
+
+
+def _about(settings: CampaignSettings, done: Sequence[Done[CaseTest]]) -> list[str]:
     seconds = settings.n_frames / settings.tests[0].configure().camera.rate_hz
     return [
         f"navapp {__version__}, Python {platform.python_version()}, {platform.machine()}, "
@@ -69,7 +91,7 @@ def _summarise(
     rows: Sequence[Row],
     judged: Sequence[Judged],
     settings: CampaignSettings,
-    done: Sequence[Done],
+    done: Sequence[Done[CaseTest]],
 ) -> dict[str, Any]:
     return {
         "tests": len(done),
@@ -81,7 +103,7 @@ def _summarise(
 
 
 def _find_pictures(
-    folder: CampaignFolder, settings: CampaignSettings, done: Sequence[Done]
+    folder: CampaignFolder[CaseTest], settings: CampaignSettings, done: Sequence[Done[CaseTest]]
 ) -> dict[Case, bytes]:
     """Of each case that of the test with the worst frame that is OK."""
     pictures = {}
@@ -93,18 +115,19 @@ def _find_pictures(
     return pictures
 
 
-def _worst_mm(done: Done) -> float:
+def _worst_mm(done: Done[CaseTest]) -> float:
     ours = done.followed.get("bimcc")
     frames = () if ours is None else ours.frames
     return max((one.tre_mm or 0.0 for one in frames if one.is_ok), default=0.0)
 
 
-def _make_csv(done: Sequence[Done]) -> str:
+def _make_csv(done: Sequence[Done[CaseTest]]) -> str:
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
     writer.writerow(
-        ("sample", "stage", "situation", "test", "seed", "method", *_COLUMNS, "reasons")
-    )
+        ("sample", "stage", "situation", "test", "seed", "method", *_COLUMNS, "reasons",
+         *_CLAIMED_COLUMNS, *_BUDGET_COLUMNS)
+    )  # fmt: skip
     for one in done:
         case = one.test.case
         for method, followed in one.followed.items():
@@ -112,6 +135,12 @@ def _make_csv(done: Sequence[Done]) -> str:
                 values = (getattr(frame, name) for name in _COLUMNS)
                 writer.writerow(
                     (case.sample, case.stage, case.situation, one.test.number, one.test.seed,
-                     method, *values, "; ".join(frame.reasons))
+                     method, *values, "; ".join(frame.reasons), *_tell_more(frame))
                 )  # fmt: skip
     return out.getvalue()
+
+
+def _tell_more(frame: FrameScore) -> list[float | None]:
+    """The bounds at all levels, and the error budget."""
+    claimed = [None] * len(LEVELS) if frame.claimed_mm is None else [*frame.claimed_mm]
+    return [*claimed, *(getattr(frame.budget, name, None) for name in _BUDGET_COLUMNS)]

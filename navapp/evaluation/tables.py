@@ -33,7 +33,12 @@ _ABOUT = (
 
 
 def make_tables(
-    rows: Sequence[Row], judged: Sequence[Judged], about: Sequence[str], *, is_quick: bool
+    rows: Sequence[Row],
+    judged: Sequence[Judged],
+    about: Sequence[str],
+    of_the_judge: Sequence[str] = (),
+    *,
+    is_quick: bool,
 ) -> str:
     """The whole of `tables.md`.
 
@@ -41,6 +46,7 @@ def make_tables(
         rows: of all cases and methods.
         judged: of all methods.
         about: how it was made, a line each.
+        of_the_judge: further lines on it.
         is_quick: it is a short look, and says so.
     """
     parts = ["# Evaluation on simulated knees", ""]
@@ -58,7 +64,7 @@ def make_tables(
         if shown:
             parts += [f"## Table {number}: {sample.title}", "", _HEAD, "|---" * 11 + "|"]
             parts += [_format_case(case, by_case) for case in shown] + [""]
-    parts += _format_judged(judged)
+    parts += [*_format_judged(judged), *of_the_judge]
     parts += ["## Where the paper contradicts itself", "", *(f"- {one}" for one in CONTRADICTIONS)]
     return "\n".join(parts) + "\n"
 
