@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
 from navapp.cli.evaluate_recording import add_options, check_no_recording, run_recording
+from navapp.cli.evaluate_stress import add_stress_options, check_no_stress, run_stress
 from navapp.errors import UsageError
 
 if TYPE_CHECKING:
@@ -16,6 +17,7 @@ examples:
   navapp evaluate --quick --out look/            every case, one test of 5 frames: some minutes
   navapp evaluate --out tables/                  all of it: about two hours on two cores
   navapp evaluate --stages opening --methods bimcc --tests 2 --out opening/
+  navapp evaluate --stress --out stress/         one thing at a time made worse: about two hours
   navapp evaluate --recording pairs/ --rig rig.yml --plan P --truth truth.json --out study/
 
 3 samples x 5 stages x 4 situations x 3 methods, 5 tests each, every test another simulated knee,
@@ -53,6 +55,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--processes", type=int, metavar="N", help="at a time (the computer's cores, at most 4)"
     )
+    add_stress_options(parser)
     add_options(parser)
     parser.add_argument("--out", metavar="DIR", required=True, help="folder for the results")
     parser.add_argument("--json", metavar="FILE", help="result for programs (- is stdout)")
@@ -66,6 +69,9 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     if options.recording is not None:
         return _run_recording(options, diagnostics)
     check_no_recording(options)
+    if options.stress:
+        return _run_stress(options, diagnostics)
+    check_no_stress(options)
     check_writable(options.json)
     settings = _read_settings(options)
     n_processes = options.processes or min(4, os.cpu_count() or 1)
@@ -85,12 +91,26 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     return 0
 
 
+def _run_stress(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
+    from navapp.evaluation.cases import METHODS, SAMPLES, SITUATIONS, STAGE_NAMES
+
+    usual = {
+        "samples": list(SAMPLES), "stages": list(STAGE_NAMES), "situations": list(SITUATIONS),
+        "methods": list(METHODS),
+    }  # fmt: skip
+    for name, value in usual.items():
+        if getattr(options, name) != value:
+            raise UsageError(f"--{name} is of the tables", remedy="leave it out, or --stress")
+    return run_stress(options, diagnostics)
+
+
 def _run_recording(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     from navapp.evaluation.cases import METHODS, SAMPLES, SITUATIONS, STAGE_NAMES
 
     usual = {
         "samples": list(SAMPLES), "stages": list(STAGE_NAMES), "situations": list(SITUATIONS),
         "tests": None, "frames": None, "seed": None, "quick": False, "processes": None,
+        "stress": False, "axes": None,
     }  # fmt: skip
     for name, value in usual.items():
         if getattr(options, name) != value:
