@@ -10,10 +10,12 @@ Source: Rao 1945, Cramer 1946; for a shift between two noisy pictures Robinson a
 """
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from navapp.geometry.box import Box
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.rectification import RectifiedGeometry, RectifiedPair
 from navapp.geometry.transform import FloatArray, RigidTransform, twist_slopes
@@ -124,13 +126,7 @@ def weigh_pixels(
     import cv2
 
     box, at = pair.box, (pixels.rows, pixels.columns)
-    is_seen = np.isfinite(support_px)
-    columns, rows = np.meshgrid(np.arange(box.width) + box.x, np.arange(box.height) + box.y)
-    asked = (columns - np.nan_to_num(support_px)).astype(np.float32), rows.astype(np.float32)
-
-    def face(picture: Floats, method: int = cv2.INTER_LANCZOS4) -> Floats:
-        return np.asarray(cv2.remap(picture, *asked, method), dtype=np.float32)
-
+    is_seen, face = np.isfinite(support_px), partial(_face, box=box, support_px=support_px)
     left, right = (picture.astype(np.float32) for picture in (pair.left, pair.right))
     slope_left = np.asarray(cv2.filter2D(left, -1, _SLOPE), dtype=np.float32)
     slope_right = np.asarray(cv2.filter2D(right, -1, _SLOPE), dtype=np.float32)
@@ -140,11 +136,21 @@ def weigh_pixels(
     squeezed[at] = pixels.squeeze
     own = _without_mean(slope_left[box.slices] / np.nan_to_num(squeezed, nan=1.0), is_seen)[at]
     other = gain * _without_mean(face(slope_right), is_seen)[at]
-    noise_right = face(variances[1], cv2.INTER_LINEAR)[at] / pixels.squeeze
+    noise_right = face(variances[1], is_smooth=True)[at] / pixels.squeeze
     noise = variances[0][box.slices][at] + gain**2 * noise_right
     difference = greys[0] - gain * greys[1]
     score = -0.5 * (own + other) * difference / noise
     return PixelInformation(own * other / noise, score, difference / np.sqrt(noise))
+
+
+def _face(picture: Floats, box: Box, support_px: Floats, *, is_smooth: bool = False) -> Floats:
+    """(h, w) of the right picture (H, W): what the support says faces the pixels of the box."""
+    import cv2
+
+    columns, rows = np.meshgrid(np.arange(box.width) + box.x, np.arange(box.height) + box.y)
+    asked = (columns - np.nan_to_num(support_px)).astype(np.float32), rows.astype(np.float32)
+    method = cv2.INTER_LINEAR if is_smooth else cv2.INTER_LANCZOS4
+    return np.asarray(cv2.remap(picture, *asked, method), dtype=np.float32)
 
 
 def _without_mean(values: NDArray[np.floating], is_seen: NDArray[np.bool_]) -> FloatArray:
@@ -170,11 +176,19 @@ def estimate_ideally(pixels: PixelModel, told: PixelInformation) -> FloatArray:
     return np.asarray(np.linalg.solve(information, pixels.slopes.T @ told.score))
 
 
+def weigh_directions(
+    pose: RigidTransform, centre_mm: FloatArray, targets_mm: FloatArray
+) -> FloatArray:
+    """(6, 6) mean over the targets (N, 3) of J^T J, J = how a target moves with the twist."""
+    slopes = twist_slopes(pose.rotate(targets_mm - centre_mm))
+    return np.asarray(np.einsum("nki,nkj->ij", slopes, slopes) / len(slopes))
+
+
 def find_least_error_mm(information: FloatArray, mean_square: FloatArray) -> float:
     """Cramer-Rao bound of the root mean square error over the targets.
 
     Args:
         information: (6, 6) of the twist.
-        mean_square: (6, 6) mean over the targets of J^T J, J = how a target moves with the twist.
+        mean_square: (6, 6) of `weigh_directions`.
     """
     return float(np.sqrt(np.trace(np.linalg.solve(information, mean_square))))

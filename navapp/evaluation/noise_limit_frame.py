@@ -16,13 +16,14 @@ from navapp.evaluation.noise_limit import (
     find_least_error_mm,
     join_information,
     model_pixels,
+    weigh_directions,
     weigh_pixels,
 )
 from navapp.evaluation.noise_limit_sensor import find_variances
 from navapp.evaluation.scores import ErrorBudget
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.rectification import RectifiedPair, Rectifier
-from navapp.geometry.transform import FloatArray, RigidTransform, twist_slopes
+from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer import RenderedView, bounds_of, render_rectified
 from navapp.stereo import refine_on_model
 from navapp.values import DisparityMap, Origin
@@ -84,8 +85,7 @@ def measure_budget(
     obeys = np.abs(told.deviation) < _MOST_DEVIATION
     obeying, told = pixels.select(obeys), told.select(obeys)
     rectified = rectifier.geometry.rectified_from_left @ true
-    arms = twist_slopes(rectified.rotate(targets_mm - centre_mm))
-    mean_square = np.einsum("nki,nkj->ij", arms, arms) / len(arms)
+    mean_square = weigh_directions(rectified, centre_mm, targets_mm)
     off_mm = pose.apply(targets_mm) - true.apply(targets_mm)
     try:
         return ErrorBudget(

@@ -1,7 +1,7 @@
 """The judge as a rejector: what is left of the error when the frames it trusts least are left out.
 
-Sources: risk against coverage El-Yaniv and Wiener 2010, area below it Geifman and El-Yaniv 2017;
-area under the ROC curve by ranks Hanley and McNeil 1982.
+Sources: risk against coverage El-Yaniv and Wiener 2010, area below it Geifman, Uziel and
+El-Yaniv 2019; area under the ROC curve by ranks Hanley and McNeil 1982.
 """
 
 import math

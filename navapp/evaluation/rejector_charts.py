@@ -66,15 +66,15 @@ def _draw_levels(axes: Any, bounds: BoundQuality) -> None:
     nominal = [100.0 * one.nominal for one in bounds.levels]
     for told, colour, shares, intervals in (
         (
+            "the covariance alone", "#f6ad55",
+            [one.claimed for one in bounds.levels], [one.claimed_ci95 for one in bounds.levels],
+        ),
+        (
             "the judge's bound", "#2b6cb0",
             [one.observed for one in bounds.levels], [one.ci95 for one in bounds.levels],
         ),
-        (
-            "the covariance alone", "#c05621",
-            [one.claimed for one in bounds.levels], [one.claimed_ci95 for one in bounds.levels],
-        ),
     ):  # fmt: skip
-        axes.plot(nominal, [100.0 * one for one in shares], "o-", color=colour, label=told)
+        axes.plot(nominal, [100.0 * one for one in shares], "o--", color=colour, label=told)
         for at, ends in zip(nominal, intervals, strict=True):
             if ends is not None:
                 axes.plot((at, at), [100.0 * end for end in ends], color=colour, alpha=0.5)

@@ -12,11 +12,12 @@ from navapp.evaluation.noise_limit import (
     find_least_error_mm,
     join_information,
     model_pixels,
+    weigh_directions,
     weigh_pixels,
 )
 from navapp.geometry.box import Box
 from navapp.geometry.rectification import RectifiedGeometry, RectifiedPair
-from navapp.geometry.transform import RigidTransform, twist_slopes
+from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from navapp.geometry.zbuffer import render_rectified
 from tests.registration.shapes import grid_mesh
 
@@ -80,8 +81,7 @@ def scene() -> Scene:
 
 
 def mean_square() -> np.ndarray:
-    arms = twist_slopes(TARGETS_MM - SHEET.centroid_mm)
-    return np.einsum("nki,nkj->ij", arms, arms) / len(arms)
+    return weigh_directions(POSE, SHEET.centroid_mm, TARGETS_MM)
 
 
 @pytest.mark.parametrize("axis", range(6))
@@ -135,6 +135,17 @@ def test_brightness_and_contrast_of_one_eye_change_nothing(scene) -> None:
     np.testing.assert_allclose(
         estimate_ideally(scene.pixels, one), estimate_ideally(scene.pixels, other), atol=1e-4
     )
+
+
+def test_directions_weigh_as_much_as_they_move_the_targets() -> None:
+    turned = RigidTransform.from_parts(
+        "left_rect", "femur", rotation_from_vector([0.3, -0.5, 0.2]), (5.0, 0.0, 300.0)
+    )
+    centre_mm, twist = np.array([3.0, 1.0, -2.0]), 1e-4 * np.array([1, -2, 3, 0.1, 0.2, -0.3])
+    moved = turned.move(twist, turned.apply(centre_mm)).apply(TARGETS_MM)
+    square = np.mean(np.sum((moved - turned.apply(TARGETS_MM)) ** 2, axis=1))
+    told = twist @ weigh_directions(turned, centre_mm, TARGETS_MM) @ twist
+    assert told == pytest.approx(square, rel=1e-3)
 
 
 def test_more_pixels_and_less_noise_tell_more() -> None:
