@@ -190,5 +190,9 @@ def find_least_error_mm(information: FloatArray, mean_square: FloatArray) -> flo
     Args:
         information: (6, 6) of the twist.
         mean_square: (6, 6) of `weigh_directions`.
+
+    Raises:
+        LinAlgError: the pixels leave a direction free, or noise alone speaks for it.
     """
-    return float(np.sqrt(np.trace(np.linalg.solve(information, mean_square))))
+    root = np.linalg.solve(np.linalg.cholesky(information), np.eye(6))
+    return float(np.sqrt(np.trace(root @ mean_square @ root.T)))

@@ -165,3 +165,15 @@ def test_more_pixels_and_less_noise_tell_more() -> None:
     # A known variance: one direction, one pixel of information 25 / px^2.
     known = np.eye(6) * 25.0
     assert find_least_error_mm(known, np.diag([1.0, 0, 0, 0, 0, 0])) == pytest.approx(0.2)
+    mixed = known + np.diag([5.0] * 5, 1) + np.diag([5.0] * 5, -1)
+    weights = np.diag([1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
+    assert find_least_error_mm(mixed, weights) == pytest.approx(
+        np.sqrt(np.trace(weights @ np.linalg.inv(mixed)))
+    )
+
+
+@pytest.mark.parametrize("least", [0.0, -1.0])
+def test_a_direction_that_nothing_fixes_has_no_bound(least) -> None:
+    information = np.diag([1.0, 1.0, 1.0, 1.0, 1.0, least])
+    with pytest.raises(np.linalg.LinAlgError):
+        find_least_error_mm(information, np.eye(6))
