@@ -17,6 +17,8 @@ OK_ERROR_MM = 0.5
 CHOSEN = "chosen"
 # A bone fills half of its box and more; what lies around it may be black.
 UNUSABLE_FRACTION = 0.7
+# Of the model, by something before it: the bone lies in the open; chosen.
+_LITTLE_OCCLUDED = 0.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -249,6 +251,12 @@ def is_bone_absent(agreement: Agreement) -> bool:
     """Whether so little of the model agrees that the bone is not there."""
     evidence = Evidence(agreement=agreement)
     return any(rule.status(evidence) is Status.LOST for rule in _OF_AGREEMENT)
+
+
+def is_worth_a_second_look(verdict: Verdict) -> bool:
+    """Whether a pose that is not OK lies in the open, so that highlights may be the reason."""
+    is_open = verdict.occluded_fraction <= _LITTLE_OCCLUDED
+    return verdict.status is Status.DEGRADED and is_open
 
 
 def is_place_doubted(verdict: Verdict) -> bool:

@@ -21,9 +21,9 @@ from navapp.resection.face_fit import (
     fit_disparity_plane,
 )
 from navapp.resection.face_view import LEAST_PIXELS, FaceView, FaceViewer, grow
-from navapp.resection.matte_pictures import find_clipped, make_matte_pair
 from navapp.resection.remaining_bone import Cut
 from navapp.stereo import match_surface, refine_on_model
+from navapp.stereo.matte_pictures import find_clipped, make_matte_pair
 from navapp.values import (
     BoneModel,
     DisparityMap,

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 from navapp.geometry.rectification import Image
 from navapp.geometry.rig import StereoRig
-from navapp.registration.verdict import Goal, is_place_doubted
+from navapp.registration.verdict import Goal, is_place_doubted, is_worth_a_second_look
 from navapp.tracking.diagnosis import Diagnosis
 from navapp.tracking.first_registration import FirstRegistration
 from navapp.tracking.frame import Fit, Frame, ignore
@@ -17,6 +17,7 @@ from navapp.tracking.judging import PoseJudge
 from navapp.tracking.motion import TrackState, is_worth_a_search
 from navapp.tracking.search.after_loss import SearchAfterLoss
 from navapp.tracking.search.buried import BuriedSearch
+from navapp.tracking.search.highlights import HighlightSearch
 from navapp.tracking.search.near import NearSearch
 from navapp.tracking.search.whole_view import WholeViewSearch
 from navapp.tracking.surface_meter import NEAR_VIEW, SurfaceMeter
@@ -44,6 +45,7 @@ class BimccTracker(Tracker):
         meter: SurfaceMeter | None = None,
         judge: PoseJudge | None = None,
         near: NearSearch | None = None,
+        highlights: HighlightSearch | None = None,
         buried: BuriedSearch | None = None,
         after_loss: SearchAfterLoss | None = None,
         diagnosis: Diagnosis | None = None,
@@ -51,6 +53,7 @@ class BimccTracker(Tracker):
         super().__init__(rig, bone, settings, judge, diagnosis, meter)
         meter, scorer = self.meter, self.scorer
         self.near = near or NearSearch(meter, scorer.score)
+        self.highlights = highlights or HighlightSearch(meter)
         self.buried = buried or BuriedSearch(meter)
         self.after_loss = after_loss or SearchAfterLoss(meter, self.near, scorer)
         self.whole_view = WholeViewSearch(meter, aspects)
@@ -72,6 +75,9 @@ class BimccTracker(Tracker):
                 frame = replace(frame, on_measured=checks.check)
                 fits = self.near.find(frame)
                 best = self.judge_fits(frame, fits, goal, frame.start, checks=checks)
+                if is_worth_a_second_look(best.verdict):
+                    again = self.look_without_highlights(frame, best)
+                    best = self.judge_fits(frame, again, goal, frame.start, best, checks)
                 if is_place_doubted(best.verdict):
                     may_search_long = state.is_search_due and is_worth_a_search(best)
                     frame = replace(frame, may_search_long=may_search_long)
@@ -91,6 +97,11 @@ class BimccTracker(Tracker):
             best = best.with_cause(self.find_cause(left, right, left_from_bone, state, best))
         # Update the motion, and the box.
         return self.update(best, state, left, captured_ns, watch)
+
+    def look_without_highlights(self, frame: Frame, answer: TrackedFrame) -> Iterable[Fit]:
+        """Fits to the same pictures without what is mirrored in the bone, near an answer's pose."""
+        pose = answer.left_from_bone
+        return () if pose is None else self.highlights.find(frame, self.rectify_pose(pose))
 
     def find_for_glance(self, frame: Frame) -> Iterable[Fit | None]:
         """Where the model itself rests next to the start; nothing is measured around it."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from navapp.geometry.rectification import Image
 from navapp.geometry.transform import RigidTransform
 from navapp.registration import distinct, make_far_starts, make_near_starts, select_poses
-from navapp.registration.verdict import Goal
+from navapp.registration.verdict import Goal, is_worth_a_second_look
 from navapp.tracking.frame import Fit, Frame
 from navapp.tracking.picked_landmarks import find_rough_poses
 from navapp.tracking.surface_meter import WIDE_BOX, Measurement
@@ -93,15 +93,27 @@ class FirstRegistration:
 
         centre_mm = frame.start.apply(tracker.centre_mm)
         fits = fit_from(make_near_starts(frame.start, centre_mm), 0.0, _NEAR_PART)
-        answers = self._judge_distinct(frame, fits, goal)
+        answers = self._look_again(frame, self._judge_distinct(frame, fits, goal), goal)
         if not _is_ok(answers):
             fits += fit_from(make_far_starts(frame.start, centre_mm), _NEAR_PART, _FAR_PART)
-            answers = self._judge_distinct(frame, fits, goal)
+            answers = self._look_again(frame, self._judge_distinct(frame, fits, goal), goal)
         if not _is_ok(answers):
             buried = self._judge_buried(frame, measured, goal)
             answers = sorted([buried, *answers], key=lambda one: one.verdict.rank)
         frame.on_progress(1.0)
         return answers
+
+    def _look_again(
+        self, frame: Frame, answers: list[TrackedFrame], goal: Goal
+    ) -> list[TrackedFrame]:
+        """With the best answer measured without highlights, where it is better so."""
+        best, *others = answers
+        # What speaks against the best of several poses is not taken back by a second look.
+        is_ambiguous = Reason.AMBIGUOUS in best.verdict.reasons
+        if is_ambiguous or not is_worth_a_second_look(best.verdict):
+            return answers
+        fits = self._tracker.look_without_highlights(frame, best)
+        return [self._tracker.judge_fits(frame, fits, goal, frame.start, best), *others]
 
     def _judge_buried(self, frame: Frame, measured: Measurement, goal: Goal) -> TrackedFrame:
         """The answer of the search for a bone that tissue continues."""
@@ -120,16 +132,18 @@ class FirstRegistration:
         watch: Stopwatch,
     ) -> list[TrackedFrame]:
         """In a box, or in the whole view, without a pose to start from."""
-        pair = self._tracker.whole_view.rectify(left, right, prior)
+        tracker = self._tracker
+        pair = tracker.whole_view.rectify(left, right, prior)
         watch.lap("rectify")
-        scored = self._tracker.whole_view.find_poses(pair, prior, on_progress)
+        scored = tracker.whole_view.find_poses(pair, prior, on_progress)
         watch.lap("estimate")
         poses = select_poses(scored)
         found = [self._fit_pose(Frame(pair, pose, watch)) for pose in poses]
         fits = [fit for fit in found if fit is not None]
         if not fits:
-            return [self._tracker.judge.lost(Reason.NO_SURFACE, watch)]
-        return self._judge_distinct(Frame(pair, poses[0], watch), fits, goal)
+            return [tracker.judge.lost(Reason.NO_SURFACE, watch)]
+        frame = Frame(pair, poses[0], watch, rectify_coloured=tracker.colours_of(left, right))
+        return self._look_again(frame, self._judge_distinct(frame, fits, goal), goal)
 
     def _fit_pose(self, frame: Frame) -> Fit | None:
         """What explains more: the model matched where it is expected, or what lies around it."""

@@ -1,11 +1,12 @@
 """Following a pose to rest on the model: measuring where it is expected, and fitting, in turns."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from navapp.geometry.transform import RigidTransform
 from navapp.registration import fit_bimcc, fit_pose
 from navapp.tracking.frame import MODEL_SETTINGS, Fit, Frame, OnMeasured, ignore
-from navapp.tracking.surface_meter import NEAR_BOX, SurfaceMeter
+from navapp.tracking.surface_meter import NEAR_BOX, Expected, Measurement, SurfaceMeter
 from navapp.values import Reason
 
 
@@ -25,10 +26,17 @@ class Follower:
     Args:
         meter: of the bone's surface.
         settings: when it rests.
+        measure: on all of the model; without, as the meter does.
     """
 
-    def __init__(self, meter: SurfaceMeter, settings: RestSettings | None = None) -> None:
+    def __init__(
+        self,
+        meter: SurfaceMeter,
+        settings: RestSettings | None = None,
+        measure: Callable[[Expected], Measurement] | None = None,
+    ) -> None:
         self._meter, self._settings = meter, settings or RestSettings()
+        self._measure_on_model = measure or meter.measure_on_model
 
     def follow(
         self,
@@ -61,7 +69,7 @@ class Follower:
             expected = expected or self._meter.render(frame.pair, pose, NEAR_BOX)
             if expected is None:
                 break
-            measure = self._meter.measure_on_model if is_near else self._meter.measure_on_samples
+            measure = self._measure_on_model if is_near else self._meter.measure_on_samples
             measured = measure(expected)
             watch.lap("stereo")
             rested = None

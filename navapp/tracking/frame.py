@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+from navapp.geometry.box import Box
 from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.transform import RigidTransform
 from navapp.registration import BimccSettings
@@ -21,6 +22,7 @@ MODEL_SETTINGS = BimccSettings(narrowest_mm=0.2, n_sigmas=1.2)
 # which lie in the open, show at most so much (tests.bench.correlated_residuals).
 NOISE_VARIANCE_RATIO = 0.65**2
 
+RectifyBox = Callable[[Box, tuple[float, float]], RectifiedPair]
 OnMeasured = Callable[[Measurement, RigidTransform], object]
 
 
@@ -36,6 +38,9 @@ class Frame:
     start: RigidTransform  # rectified left camera from bone, expected
     watch: Stopwatch
     nearer: NearerSearch | None = None  # how to look for what stands before all of that
+    # the same pictures in their colours, a box of them as far as a band of disparities reaches;
+    # None of grey ones.
+    rectify_coloured: RectifyBox | None = None
     n_lost: int = 0  # frames lost before this one; in odd ones a search goes further off
     may_search_long: bool = True  # a search that takes as long as many frames is worth it
     # told what is measured on all of the model near `start`, and at which pose.

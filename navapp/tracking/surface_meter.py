@@ -207,7 +207,10 @@ class SurfaceMeter:
         Exact, but only where the surface lies within about half a pixel of the model's: elsewhere
         it answers nothing.
         """
-        found = refine_on_model(expected.pair, expected.support_px)
+        return self.take_on_model(expected, refine_on_model(expected.pair, expected.support_px))
+
+    def take_on_model(self, expected: Expected, found: DisparityMap) -> Measurement:
+        """What was matched on the model's own surface, as a measurement of it."""
         is_expected = np.isfinite(expected.support_px)
         cloud = self._cloud(remove_gap_rims(found, is_expected))
         n_expected = max(int(np.count_nonzero(is_expected)), 1)

@@ -5,6 +5,7 @@ import operator
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Literal
 
 from navapp.geometry.bands import begin_on_helper
@@ -16,7 +17,7 @@ from navapp.registration.verdict import Goal, is_place_doubted
 from navapp.tracking.box.tracker import BoxTracker
 from navapp.tracking.checks import PairChecks
 from navapp.tracking.diagnosis import Diagnosis
-from navapp.tracking.frame import FREE_SETTINGS, Fit, Frame, ignore
+from navapp.tracking.frame import FREE_SETTINGS, Fit, Frame, RectifyBox, ignore
 from navapp.tracking.judging import PoseJudge
 from navapp.tracking.motion import TrackState
 from navapp.tracking.scoring import FitScorer
@@ -164,7 +165,12 @@ class Tracker(ABC):
         start = self.rectify_pose(left_from_bone)
         pair = self.meter.rectify(left, right, start, margins)
         watch.lap("rectify")
-        return Frame(pair, start, watch, self.meter.make_nearer_search(left, right))
+        nearer = self.meter.make_nearer_search(left, right)
+        return Frame(pair, start, watch, nearer, self.colours_of(left, right))
+
+    def colours_of(self, left: Image, right: Image) -> RectifyBox | None:
+        """How boxes of two pictures are rectified in their colours; None of grey ones."""
+        return partial(self.meter.rectifier.rectify, left, right) if left.ndim == 3 else None
 
     def begin_checks(self, frame: Frame) -> PairChecks:
         """Checks of a frame in which the bone is expected near the start, begun at once."""
