@@ -133,7 +133,8 @@ def _join(levels: Sequence[float | None], one: AxisRows) -> str:
 
 
 def _with_unit(level: float, one: AxisRows) -> str:
-    return f"{level:.3g} {one.axis.unit}".strip()
+    # Three digits, and no exponent.
+    return f"{float(f'{level:.3g}'):g} {one.axis.unit}".strip()
 
 
 def _mm(value: float | None) -> str:

@@ -101,3 +101,13 @@ def test_a_quick_look_says_so(tmp_path) -> None:
     content = write_stress(CampaignFolder(tmp_path, quick), quick)
     assert content["summary"]["quick"]
     assert "no results" in (tmp_path / "stress.md").read_text()
+
+
+def test_a_large_level_is_told_without_an_exponent(tmp_path) -> None:
+    settings = StressSettings(("noise",), 1, 2, 1)
+    folder = CampaignFolder(tmp_path, settings)
+    for test in settings.tests:
+        content = {"test": test.name, "seed": 1, "methods": {"bimcc": followed(*GOOD).to_json()}}
+        folder.file_of(test, is_timed=False).write_text(json.dumps(content))
+    write_stress(folder, settings)
+    assert "| 20000 e | 100 e | - |" in (tmp_path / "stress.md").read_text()
