@@ -107,13 +107,16 @@ class FirstRegistration:
         self, frame: Frame, answers: list[TrackedFrame], goal: Goal
     ) -> list[TrackedFrame]:
         """With the best answer measured without highlights, where it is better so."""
-        best, *others = answers
+        tracker, (best, *others) = self._tracker, answers
+        pose = best.left_from_bone
         # What speaks against the best of several poses is not taken back by a second look.
         is_ambiguous = Reason.AMBIGUOUS in best.verdict.reasons
-        if is_ambiguous or not is_worth_a_second_look(best.verdict):
+        if pose is None or is_ambiguous or not is_worth_a_second_look(best.verdict):
             return answers
-        fits = self._tracker.look_without_highlights(frame, best)
-        return [self._tracker.judge_fits(frame, fits, goal, frame.start, best), *others]
+        fits = tracker.look_without_highlights(frame, best)
+        # The bone is expected where it was found: the start may be far off.
+        found = tracker.rectify_pose(pose)
+        return [tracker.judge_fits(frame, fits, goal, found, best), *others]
 
     def _judge_buried(self, frame: Frame, measured: Measurement, goal: Goal) -> TrackedFrame:
         """The answer of the search for a bone that tissue continues."""

@@ -1,0 +1,56 @@
+"""The first registration looks once more, without highlights, at an answer that is not OK."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import pytest
+
+from navapp.geometry.transform import RigidTransform
+from navapp.tracking.bimcc_tracker import BimccTracker
+from navapp.tracking.first_registration import FirstRegistration
+from navapp.tracking.frame import Fit, Frame
+from navapp.values import Reason, Status, Stopwatch, TrackedFrame
+from tests.tracking.rooms import GOAL, room
+
+
+class Found:
+    """Stands for the search without highlights: rests where the surface without them lies."""
+
+    def __init__(self, tracker: BimccTracker) -> None:
+        self._tracker, self.n_asked = tracker, 0
+
+    def find(self, frame: Frame, pose: RigidTransform) -> Iterator[Fit]:
+        self.n_asked += 1
+        yield from self._tracker.near.find_on_model(replace(frame, start=pose))
+
+
+def look_again(off_mm: float, *reasons: Reason) -> tuple[TrackedFrame, Found]:
+    """A doubted answer at the true pose, after a start that was so far off."""
+    a = room()
+    picture = a.frames[0]
+    tracker = BimccTracker(a.rig, a.tracker.model.bone)
+    found = Found(tracker)
+    tracker.highlights = found
+    truth = a.truth(picture)
+    frame = tracker.begin(picture.left, picture.right, truth, Stopwatch())
+    fit = next(iter(tracker.near.find_on_model(frame)))
+    answer = tracker.judge.judge(frame, fit, GOAL)
+    verdict = replace(answer.verdict, status=Status.DEGRADED, reasons=reasons, coverage=0.1)
+    doubted = replace(answer, verdict=verdict)
+    frame = replace(frame, start=frame.start.move((off_mm, 0, 0, 0, 0, 0), (0.0, 0.0, 0.0)))
+    (best,) = FirstRegistration(tracker)._look_again(frame, [doubted], GOAL)
+    return best, found
+
+
+@pytest.mark.parametrize("off_mm", [0.0, 20.0])
+def test_a_rough_start_does_not_count_against_what_is_seen_then(off_mm: float) -> None:
+    best, found = look_again(off_mm, Reason.COVERAGE_LOW)
+    assert found.n_asked == 1
+    assert best.verdict.status is Status.OK
+    assert Reason.JUMPED not in best.verdict.reasons
+
+
+def test_one_of_several_poses_is_not_made_sure_by_a_second_look() -> None:
+    best, found = look_again(0.0, Reason.AMBIGUOUS)
+    assert found.n_asked == 0
+    assert best.verdict.reasons == (Reason.AMBIGUOUS,)
