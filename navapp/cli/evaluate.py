@@ -17,7 +17,7 @@ examples:
   navapp evaluate --quick --out look/            every case, one test of 5 frames: some minutes
   navapp evaluate --out tables/                  all of it: about two hours on two cores
   navapp evaluate --stages opening --methods bimcc --tests 2 --out opening/
-  navapp evaluate --stress --out stress/         one thing at a time made worse: about two hours
+  navapp evaluate --stress --out stress/         one thing at a time made worse: hours
   navapp evaluate --recording pairs/ --rig rig.yml --plan P --truth truth.json --out study/
 
 3 samples x 5 stages x 4 situations x 3 methods, 5 tests each, every test another simulated knee,

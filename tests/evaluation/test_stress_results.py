@@ -58,7 +58,8 @@ def test_the_causes_stand_first_and_their_hidden_levels_do_not_count(written) ->
         "# Stress matrix on simulated knees", "## What it cannot notice", "### scale of the plan",
         "## Where OK ends", "## OK and wrong", "### light on the sensors",
     ]  # fmt: skip
-    assert "| scale of the plan | -1.61 % and 1.61 % | - | the check on the patient |" in text
+    assert "| scale of the plan, % | 1.55 at -5; 1.55 at -2; 0.15 at -1; " in text
+    assert "; 1.55 at 5 | -1.61 % and 1.61 % | - | the check on the patient |" in text
     assert "| 2 (hidden) | 100% | 1.55 | 1.60 | 1.55 | 2 | 0% | - |" in text
 
 
