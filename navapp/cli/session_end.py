@@ -37,8 +37,9 @@ class KeptFiles:
             diagnostics.warn(f"no frame came, {self.recording} was not kept")
         elif self.recording is not None:
             size = sum(_size_of(file) for file in self.recording.rglob("*"))
+            frames = f"{n_frames} frames, " if is_whole else ""
             diagnostics.say(
-                f"recorded session: {self.recording} ({n_frames} frames, {size / 1e6:.0f} MB); "
+                f"recorded session: {self.recording} ({frames}{size / 1e6:.0f} MB); "
                 f"navapp replay {self.recording} shows it again"
             )
             if not is_whole:

@@ -7,7 +7,7 @@ from pydantic import BaseModel
 
 _UNITS = {
     "mm": "mm", "ms": "ms", "s": "s", "hz": "Hz", "px": "px", "deg": "degrees", "days": "days",
-    "minutes": "minutes", "k": "kelvin",
+    "minutes": "minutes", "k": "kelvin", "mm_s": "mm/s",
 }  # fmt: skip
 _TYPES = {"string": "text", "integer": "whole number", "number": "number"}
 
@@ -27,8 +27,9 @@ def _describe_key(key: str, schema: Mapping[str, Any], tables: Mapping[str, Any]
     """Type, range and unit."""
     kinds = [one for one in schema.get("anyOf", [schema]) if one.get("type") != "null"]
     words = " or ".join(_describe(one, tables) for one in kinds)
-    unit = _UNITS.get(key.rpartition("_")[2]) if "_" in key else None
-    return f"{words}, in {unit}" if unit else words
+    # The longest first: mm_s is no time.
+    ends = sorted((end for end in _UNITS if key.endswith(f"_{end}")), key=len)
+    return f"{words}, in {_UNITS[ends[-1]]}" if ends else words
 
 
 def _describe(schema: Mapping[str, Any], tables: Mapping[str, Any]) -> str:

@@ -135,7 +135,7 @@ def _why_not_told(command: SetProjector, snapshot: Snapshot) -> str:
 
 
 def _has_failed_device(snapshot: Snapshot) -> bool:
-    # A rig that has moved is not opened again.
-    healths = {device.health for device in snapshot.devices if device.kind != "rig"}
+    # A rig that has moved is not opened again, nor is a recording that was stopped.
+    healths = {one.health for one in snapshot.devices if one.kind not in ("rig", "recording")}
     is_failed = bool(healths & {DeviceHealth.TROUBLE, DeviceHealth.LOST})
     return is_failed or (snapshot.state is SessionState.FAULT and not snapshot.rig_alarm)

@@ -125,9 +125,10 @@ def _describe_display(given: SessionSpecification, today: date) -> list[Fact]:
 def _describe_delay(given: SessionSpecification) -> Fact:
     if given.display_delay_ms == 0.0:
         return Level.QUIET, "not measured (navapp calibrate latency)"
-    bound_ms = given.display_delay_bound_ms
-    bound = f" +- {bound_ms:.0f}" if bound_ms > 0.0 else ", its bound is not known,"
-    return Level.OK, f"{given.display_delay_ms:.0f}{bound} ms"
+    delay, bound_ms = f"{given.display_delay_ms:.0f}", given.display_delay_bound_ms
+    if bound_ms == 0.0:
+        return Level.ATTENTION, f"{delay} ms; its bound is not known"
+    return Level.OK, f"{delay} +- {bound_ms:.0f} ms"
 
 
 def _describe_tool(given: SessionSpecification, kind: str, today: date) -> list[Fact]:

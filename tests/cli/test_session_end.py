@@ -22,7 +22,10 @@ def test_where_a_recording_is_and_how_large(tmp_path, capsys):
 
 def test_a_recording_that_was_stopped_is_said_to_be_so(tmp_path, capsys):
     kept = KeptFiles.begin(str(tmp_path), tmp_path / "navapp.log")
-    assert "stopped before the session's end" in told(kept, capsys, is_whole=False).err
+    said = told(kept, capsys, is_whole=False)
+    assert "stopped before the session's end" in said.err
+    # It holds fewer frames than the session had.
+    assert "7 frames" not in said.out
 
 
 def test_a_recording_without_frames_is_not_claimed(tmp_path, capsys):

@@ -97,6 +97,7 @@ def test_units_and_bounds_stand_beside_a_number():
     assert EXPLAINED["camera.rate_hz"].startswith("number above 0, in Hz")
     assert EXPLAINED["display.delay_ms"].startswith("number of at least 0, in ms")
     assert EXPLAINED["projector.tcp_port"].startswith("whole number above 0 and below 65536")
+    assert EXPLAINED["camera.simulated.drift_mm_s"].startswith("number from 0 to 300, in mm/s;")
 
 
 def test_the_keys_of_a_scripted_fault_are_told():

@@ -24,7 +24,7 @@ from navapp.control.commands import (
     ToggleLayer,
 )
 from navapp.control.rules import why_refused
-from navapp.control.states import SessionState
+from navapp.control.states import DeviceHealth, DeviceLine, SessionState
 from tests.control.fakes import Bench, a_pose, navigating
 
 SENSELESS = [
@@ -55,6 +55,13 @@ def test_a_senseless_command_is_answered_and_changes_nothing(command: Command, w
     after = bench.do(command)
     assert why in bench.refused()
     assert (after.state, after.stage, after.layers) == (before.state, before.stage, before.layers)
+
+
+@pytest.mark.parametrize(("kind", "is_opened"), [("mirror", True), ("recording", False)])
+def test_only_what_can_be_opened_again_is(kind: str, is_opened: bool) -> None:
+    line = DeviceLine(kind, "one", DeviceHealth.TROUBLE)
+    snapshot = replace(navigating(Bench()).snapshot, devices=(line,))
+    assert (why_refused(Reconnect(), snapshot) == "") is is_opened
 
 
 @pytest.mark.parametrize("command", [Register(), EnterStage(2), Blank(), Quit()])

@@ -103,6 +103,23 @@ def test_what_has_moved_is_told(changes: dict[str, Any], level: Level, words: st
     assert any(one is level and words in text for one, text in told)
 
 
+@pytest.mark.parametrize(
+    ("changes", "told"),
+    [
+        ({}, (Level.QUIET, "not measured (navapp calibrate latency)")),
+        (
+            {"display_delay_ms": 40.0, "display_delay_bound_ms": 6.0},
+            (Level.OK, "40 +- 6 ms"),
+        ),
+        ({"display_delay_ms": 40.0}, (Level.ATTENTION, "40 ms; its bound is not known")),
+    ],
+)
+def test_the_display_s_delay_is_told_with_its_bound(
+    changes: dict[str, Any], told: tuple[Level, str]
+) -> None:
+    assert facts(a_background(**changes), snapshots.navigating(), "display's delay") == [told]
+
+
 def test_tools_tell_their_age_and_another_rig() -> None:
     pointer = dataclasses.replace(POINTER, made_on=date(2026, 2, 27), rig_id="another")
     background = a_background(tools={"pointer": pointer})
