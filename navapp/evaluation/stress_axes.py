@@ -15,6 +15,7 @@ _BOARD = "a board: `navapp calibrate check`, or held into a session's view"
 _LENGTH = "a known length: a board whose squares were measured"
 _CHECK = "the check on the patient"
 _LATENCY = "`navapp calibrate latency`"
+_STAMPS = "the time stamps of both pictures"
 
 # px of blur in the exposure of 8 ms at 450 mm: the speed that makes it (docs/devices.md).
 _MM_S_PER_BLUR_PX = 450.0 / (1403.0 * 0.008)
@@ -114,7 +115,8 @@ _PICTURE_AXES = (
     Axis("baseline", "baseline, known", "mm", (30.0, 40.0, 60.0, 80.0, 120.0, 160.0), 80.0,
          _Setting("baseline_mm")),
     Axis("skew", "time between the eyes that the stamps tell, leg moved at 50 mm/s", "ms",
-         (0.0, 1.0, 2.0, 5.0, 10.0), 0.0, _Setting("skew_ms", _DRIFTING), rate_hz=_DRIFT_RATE_HZ),
+         (0.0, 1.0, 2.0, 5.0, 10.0), 0.0, _Setting("skew_ms", _DRIFTING), found_by=_STAMPS,
+         rate_hz=_DRIFT_RATE_HZ),
 )  # fmt: skip
 
 _CAUSES = (
