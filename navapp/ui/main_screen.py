@@ -8,7 +8,13 @@ from navapp.ui.devices_panel import DevicesPanel
 from navapp.ui.event_list import EventList
 from navapp.ui.footer import KeyFooter
 from navapp.ui.line_panel import LinePanel
-from navapp.ui.pictures.picture_view import NOTICE, CandidateView, PictureView, ResidualView
+from navapp.ui.pictures.picture_view import (
+    MOST_CANDIDATES,
+    NOTICE,
+    CandidateView,
+    PictureView,
+    ResidualView,
+)
 from navapp.ui.pose_panel import PosePanel, format_navigable_line, format_reason_lines
 from navapp.ui.screens import ViewScreen
 from navapp.ui.stepper import StageStepper
@@ -16,9 +22,6 @@ from navapp.ui.text_view import TextView
 from navapp.ui.title_line import TitleLine
 from navapp.ui.view import View
 from navapp.ui.work_line import WorkLine
-
-# That can be compared side by side; a search gives no more.
-MOST_CANDIDATES = 3
 
 
 class SmallNotice(TextView):

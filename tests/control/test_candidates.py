@@ -89,6 +89,7 @@ def test_each_has_a_picture_with_its_own_outline(bench: Bench) -> None:
 def test_of_a_lost_candidate_no_outline_is_drawn(bench: Bench) -> None:
     bench.script.tracked = answer(Status.LOST, Reason.COVERAGE_LOW, has_pose=True)
     bench.frames(1)
+    assert not bench.snapshot.candidates[0].picture[20:-20].any(), "nor once it is lost"
     bench.do(ChooseCandidate(1))
     bench.script.tracked = answer()
     bench.frames(1)

@@ -40,8 +40,9 @@ from navapp.ui.main_screen import MainScreen, SmallNotice
 from navapp.ui.pages import DevicesPage, EventsPage, QuitQuestion
 from navapp.ui.pictures.blocks import CELL_PX, BlockEncoder
 from navapp.ui.pictures.graphics import Graphics
-from navapp.ui.pictures.picture_view import PictureView
+from navapp.ui.pictures.picture_view import CandidateView, PictureView
 from navapp.ui.pose_panel import PosePanel
+from navapp.ui.symbols import UNICODE
 from tests.ui import snapshots
 
 Script = Callable[["BellCounter", Pilot[Any]], Awaitable[None]]
@@ -399,6 +400,24 @@ def test_arrows_go_through_candidates_where_several_wait() -> None:
     assert app.session.commands == [ChooseCandidate(1), ChooseCandidate(-1)]
     app = play(snapshots.navigating(cross_check=CHECKING), script)
     assert app.session.commands == [NudgeCross(1, 0), NudgeCross(-1, 0)]
+
+
+@pytest.mark.parametrize(
+    ("place", "numbers"), [(0, [1, 2, 3]), (1, [1, 2, 3]), (3, [3, 4, 5]), (4, [3, 4, 5])]
+)
+def test_of_many_candidates_the_one_under_review_is_among_those_side_by_side(
+    place: int, numbers: list[int]
+) -> None:
+    first, *_ = snapshots.compared().candidates
+    waiting = tuple(dataclasses.replace(first, number=k + 1, is_shown=k == place) for k in range(5))
+
+    async def script(app: BellCounter, _pilot: Pilot[Any]) -> None:
+        views = list(app.screen.query(CandidateView))
+        titles = [str(one.border_title).lstrip(f"{UNICODE.ok} ") for one in views]
+        assert [int(title[0]) for title in titles] == numbers
+        assert [one.has_class("-shown") for one in views] == [k == place + 1 for k in numbers]
+
+    play(snapshots.compared(candidates=waiting), script, size=(200, 60))
 
 
 def test_without_an_encoder_the_screen_knows_that_no_outline_is_seen() -> None:

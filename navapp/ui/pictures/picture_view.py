@@ -1,5 +1,7 @@
 """The picture with the overlay, in a frame that says what it is."""
 
+from collections.abc import Sequence
+
 from navapp.control.states import CandidateLine
 from navapp.geometry.box import Box
 from navapp.ui.pictures.fitting import choose_part
@@ -9,6 +11,8 @@ from navapp.ui.view import Level, View
 from navapp.values import DEPTH_COLOURS, Origin
 
 NOTICE = "research, not for clinical use"
+# So many are compared side by side.
+MOST_CANDIDATES = 3
 _EYE_HINT = "y: video, or what the eye sees in the mirror"
 _DEPTH_WORDS = {
     Origin.MATCHED: "matched",
@@ -81,7 +85,7 @@ class CandidateView(Picture):
     """One of several candidates: its outline, and the judge's word on it.
 
     Args:
-        index: from 0, among all that wait for a decision.
+        index: from 0, among those that are side by side.
     """
 
     def __init__(self, index: int) -> None:
@@ -90,7 +94,7 @@ class CandidateView(Picture):
 
     def show(self, view: View) -> None:
         """That candidate, when several wait."""
-        candidates = view.snapshot.candidates
+        candidates = select_compared(view.snapshot.candidates)
         is_known = len(candidates) > 1 and self._index < len(candidates)
         self.set_class(is_known, "-known")
         if not is_known:
@@ -102,6 +106,13 @@ class CandidateView(Picture):
         if self.border_title != title:
             self.border_title = title
         self.show_picture(one.picture, view.symbols.ramp)
+
+
+def select_compared(candidates: Sequence[CandidateLine]) -> Sequence[CandidateLine]:
+    """Those that have room side by side: the one under review, and those around it."""
+    place = next((k for k, one in enumerate(candidates) if one.is_shown), 0)
+    first = max(min(place - MOST_CANDIDATES // 2, len(candidates) - MOST_CANDIDATES), 0)
+    return candidates[first : first + MOST_CANDIDATES]
 
 
 def describe_candidate(one: CandidateLine, symbols: Symbols) -> str:
