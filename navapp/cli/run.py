@@ -251,10 +251,10 @@ def _run_screen(session: LiveSession, options: argparse.Namespace, diagnostics: 
             plan=plan,
             guide=options.guide,
         )
-    if runner.error is not None:
-        raise runner.error
     is_whole = controller.snapshot.is_recording
     kept.tell(n_frames, is_whole=is_whole, diagnostics=diagnostics)
+    if runner.error is not None:
+        raise runner.error
     return code
 
 

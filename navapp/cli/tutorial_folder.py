@@ -86,10 +86,13 @@ class TutorialFolder:
             )
         try:
             self.path.mkdir(parents=True, exist_ok=True)
+            # The record first: by it the folder is known, whenever this is interrupted.
             if not self._record.is_file():
-                self.configuration.write_text(_CONFIGURATION, encoding="utf-8")
-                self.board.write_text(json.dumps(_BOARD, indent=1) + "\n", encoding="utf-8")
                 self._write(set())
+            board = json.dumps(_BOARD, indent=1) + "\n"
+            for path, text in ((self.configuration, _CONFIGURATION), (self.board, board)):
+                if not path.is_file():
+                    write_whole(path, text.encode("utf-8"))
         except OSError as error:
             raise InputError(
                 f"folder {self.path} cannot be written ({error.strerror})",

@@ -70,7 +70,7 @@ def _plan(folder: TutorialFolder, diagnostics: Diagnostics) -> bool:
     source = ("--ct", folder.ct, "--contents", folder.contents, "--side", "right")
     if _call(folder, diagnostics, "plan", *source, "--out", folder.plan, "--replace") != 0:
         return False
-    diagnostics.say(f"  look at {folder.plan / 'summary.html'}: the orange line is the surface")
+    diagnostics.say(f"  look at {folder.plan / 'summary.html'}: the lines are the bones' surfaces")
     return True
 
 

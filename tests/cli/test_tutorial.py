@@ -77,6 +77,16 @@ def test_what_is_done_is_kept(tmp_path: Path) -> None:
     assert folder.find_capture().name == "capture_2"
 
 
+def test_a_beginning_that_was_interrupted_is_gone_on_with(tmp_path: Path) -> None:
+    folder = TutorialFolder(tmp_path / "t")
+    folder.begin()
+    folder.board.unlink()
+    folder.configuration.write_text("# mine\n", encoding="utf-8")
+    folder.begin()
+    assert folder.board.is_file()
+    assert folder.configuration.read_text(encoding="utf-8") == "# mine\n"
+
+
 def test_a_damaged_record_is_told(tmp_path: Path) -> None:
     folder = TutorialFolder(tmp_path)
     folder.begin()
