@@ -28,10 +28,11 @@ class WorkLine(TextView):
             return [Content.styled(cut(text, width, view.symbols), Level.BAD.value)]
         if progress is None:
             return [Content("")]
-        if math.isnan(progress.share):
-            return [Content(f" {cut(progress.what, width - 1, view.symbols)}")]
         is_cancellable = view.snapshot.state is SessionState.REGISTERING
         hint = "  c cancel" if is_cancellable else ""
+        if math.isnan(progress.share):
+            what = cut(progress.what, max(width - len(hint) - 1, 0), view.symbols)
+            return [Content.assemble(f" {what}", (hint, "bold $foreground"))]
         room = max(width - _BAR_WIDTH - len(hint) - 9, 0)
         return [
             Content.assemble(
