@@ -23,7 +23,7 @@ THEIRS = followed(score(9.0, "LOST", claimed_mm=CLAIMED), score(9.0))
 def written(tmp_path):
     """A folder of two tests in two situations, and what a program gets of it."""
     cases = (Case("man", "opening", "overlay"), Case("man", "opening", "patient"))
-    settings = CampaignSettings(cases, ("icp", "bimcc"), 1, 2, 90_001)
+    settings = CampaignSettings(cases, ("icp", "bimcc"), 1, 2, 7)
     folder = CampaignFolder(tmp_path / "out", settings)
     for test in settings.tests:
         methods = {"icp": THEIRS.to_json(), "bimcc": OURS.to_json()}
