@@ -9,7 +9,7 @@ from navapp.evaluation.cases import Case, CaseTest
 from navapp.evaluation.sequence import KnownSequence, render_test
 from navapp.registration.verdict import Goal
 from navapp.tracking import TrackState, make_tracker
-from navapp.tracking.search.highlights import join_maps
+from navapp.tracking.search.highlights import join_maps, measure_contradiction
 from navapp.values import DisparityMap, Origin, Status, TrackedFrame
 
 
@@ -26,6 +26,14 @@ def test_what_is_seen_without_highlights_counts_and_grey_alone_claims_less() -> 
     assert np.allclose(joined.sigma_px[0, :3], [0.2, 0.17, 0.2])
     assert (joined.origin > 0).tolist() == [[True, True, True, False]]
     assert (joined.x, joined.y) == (3, 4)
+
+
+def test_maps_contradict_each_other_beyond_what_both_claim() -> None:
+    claims = a_map([10.0] * 5, 0.3), a_map([9.6, 9.8, 10.0, 10.2, 10.4], 0.4)
+    assert np.isclose(measure_contradiction(*claims), 1.4826 * 0.2 / 0.5)
+    # An offset that all share is the pose's; what only one of them answers says nothing.
+    assert measure_contradiction(a_map([10.0, 11.0], 0.3), a_map([10.5, 11.5], 0.3)) == 0.0
+    assert measure_contradiction(a_map([10.0, np.nan], 0.3), a_map([np.nan, 11.0], 0.3)) == 0.0
 
 
 @pytest.fixture(scope="module")
