@@ -9,7 +9,9 @@ from dataclasses import replace
 
 from navapp.geometry.rectification import Image
 from navapp.geometry.rig import StereoRig
+from navapp.geometry.transform import RigidTransform
 from navapp.registration.verdict import Goal, is_place_doubted, is_worth_a_second_look
+from navapp.tracking.checks import PairChecks
 from navapp.tracking.diagnosis import Diagnosis
 from navapp.tracking.first_registration import FirstRegistration
 from navapp.tracking.frame import Fit, Frame, ignore
@@ -75,9 +77,7 @@ class BimccTracker(Tracker):
                 frame = replace(frame, on_measured=checks.check)
                 fits = self.near.find(frame)
                 best = self.judge_fits(frame, fits, goal, frame.start, checks=checks)
-                if is_worth_a_second_look(best.verdict):
-                    again = self.look_without_highlights(frame, best)
-                    best = self.judge_fits(frame, again, goal, frame.start, best, checks)
+                best = self.look_again(frame, best, goal, frame.start, checks)
                 if is_place_doubted(best.verdict):
                     may_search_long = state.is_search_due and is_worth_a_search(best)
                     frame = replace(frame, may_search_long=may_search_long)
@@ -98,10 +98,31 @@ class BimccTracker(Tracker):
         # Update the motion, and the box.
         return self.update(best, state, left, captured_ns, watch)
 
-    def look_without_highlights(self, frame: Frame, answer: TrackedFrame) -> Iterable[Fit]:
-        """Fits to the same pictures without what is mirrored in the bone, near an answer's pose."""
+    def look_again(
+        self,
+        frame: Frame,
+        answer: TrackedFrame,
+        goal: Goal,
+        predicted: RigidTransform,
+        checks: PairChecks | None = None,
+    ) -> TrackedFrame:
+        """What the same pictures say without what is mirrored in the bone, if that is OK.
+
+        Else the answer as it is: of two that are refused the first has seen more.
+
+        Args:
+            frame: of the answer.
+            answer: looked at again when it is DEGRADED and the bone lies in the open.
+            goal: of the stage.
+            predicted: as of `judge_fits`.
+            checks: as of `judge_fits`.
+        """
         pose = answer.left_from_bone
-        return () if pose is None else self.highlights.find(frame, self.rectify_pose(pose))
+        if pose is None or not is_worth_a_second_look(answer.verdict):
+            return answer
+        fits = self.highlights.find(frame, self.rectify_pose(pose))
+        again = self.judge_fits(frame, fits, goal, predicted, checks=checks)
+        return again if again.verdict.status is Status.OK else answer
 
     def find_for_glance(self, frame: Frame) -> Iterable[Fit | None]:
         """Where the model itself rests next to the start; nothing is measured around it."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from navapp.geometry.rectification import Image
 from navapp.geometry.transform import RigidTransform
 from navapp.registration import distinct, make_far_starts, make_near_starts, select_poses
-from navapp.registration.verdict import Goal, is_worth_a_second_look
+from navapp.registration.verdict import Goal
 from navapp.tracking.frame import Fit, Frame
 from navapp.tracking.picked_landmarks import find_rough_poses
 from navapp.tracking.surface_meter import WIDE_BOX, Measurement
@@ -106,17 +106,15 @@ class FirstRegistration:
     def _look_again(
         self, frame: Frame, answers: list[TrackedFrame], goal: Goal
     ) -> list[TrackedFrame]:
-        """With the best answer measured without highlights, where it is better so."""
-        tracker, (best, *others) = self._tracker, answers
+        """With what the best one is without highlights, where that is OK."""
+        best, *others = answers
         pose = best.left_from_bone
         # What speaks against the best of several poses is not taken back by a second look.
-        is_ambiguous = Reason.AMBIGUOUS in best.verdict.reasons
-        if pose is None or is_ambiguous or not is_worth_a_second_look(best.verdict):
+        if pose is None or Reason.AMBIGUOUS in best.verdict.reasons:
             return answers
-        fits = tracker.look_without_highlights(frame, best)
         # The bone is expected where it was found: the start may be far off.
-        found = tracker.rectify_pose(pose)
-        return [tracker.judge_fits(frame, fits, goal, found, best), *others]
+        found = self._tracker.rectify_pose(pose)
+        return [self._tracker.look_again(frame, best, goal, found), *others]
 
     def _judge_buried(self, frame: Frame, measured: Measurement, goal: Goal) -> TrackedFrame:
         """The answer of the search for a bone that tissue continues."""
