@@ -73,13 +73,13 @@ if __name__ == "__main__":
         workers = [psutil.Process(int(read_when_there(tmp_path / name))) for name in "01"]
         if how == "interrupted":  # as a terminal does it: all of its processes
             os.killpg(parent.pid, signal.SIGINT)
-            said = parent.communicate(timeout=10.0)[1]
+            said = parent.communicate(timeout=60.0)[1]
             assert said.rstrip().endswith("KeyboardInterrupt")
             assert "SpawnProcess" not in said, "the workers have nothing to say"
     finally:
         parent.kill()
         parent.communicate()
-    _, alive = psutil.wait_procs(workers, timeout=10.0)
+    _, alive = psutil.wait_procs(workers, timeout=60.0)
     assert alive == []
     assert {path.name for path in tmp_path.iterdir()} == {"0", "1", "script.py"}
 

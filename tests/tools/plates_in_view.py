@@ -23,7 +23,12 @@ class PlainRoom:
         self.rig = make_default_rig()
 
     def render(
-        self, eye: str, time_ns: int, scale: float = 1.0, turn_rad: Turn = NO_TURN
+        self,
+        eye: str,
+        time_ns: int,
+        scale: float = 1.0,
+        turn_rad: Turn = NO_TURN,
+        rows: object = None,
     ) -> NDArray[np.float32]:
         return np.full((720, 1280, 3), 0.08, np.float32)
 
