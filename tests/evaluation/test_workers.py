@@ -57,6 +57,9 @@ def test_a_killed_process_is_told_in_a_sentence(tmp_path) -> None:
 def test_no_process_outlives_the_one_that_began_it(tmp_path, how) -> None:
     code = f"""
 if __name__ == "__main__":
+    import signal
+    # What runs in the background of a shell has it ignored, and all that it begins as well.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     from functools import partial
     from pathlib import Path
     from navapp.evaluation.workers import run_in_processes
