@@ -1,16 +1,16 @@
 """`navapp evaluate`: the paper's tables on simulated knees, with three methods."""
 
 import argparse
-import os
 from typing import TYPE_CHECKING, Any
 
-from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
+from navapp.cli.campaign_options import Counts, read_counts, run_and_write
+from navapp.cli.diagnostics import Diagnostics
 from navapp.cli.evaluate_recording import add_options, check_no_recording, run_recording
 from navapp.cli.evaluate_stress import add_stress_options, check_no_stress, run_stress
 from navapp.errors import UsageError
 
 if TYPE_CHECKING:
-    from navapp.evaluation.campaign import CampaignSettings
+    from navapp.evaluation.paper.settings import TableSettings
 
 _EXAMPLE = """\
 examples:
@@ -47,7 +47,12 @@ def add_parser(subparsers: Any) -> None:
             option, nargs="+", choices=names, default=list(names), help=f"{what} (all)"
         )
     parser.add_argument("--tests", type=int, metavar="N", help=f"of each case ({_TESTS})")
-    parser.add_argument("--frames", type=int, metavar="N", help=f"of each test ({_FRAMES})")
+    parser.add_argument(
+        "--frames",
+        type=int,
+        metavar="N",
+        help=f"of each test ({_FRAMES}; 90 at least with an instrument)",
+    )
     parser.add_argument("--seed", type=int, metavar="N", help="of the first knee")
     parser.add_argument(
         "--quick", action="store_true", help="one test of 5 frames of each case: no results"
@@ -63,8 +68,7 @@ def add_parser(subparsers: Any) -> None:
 
 def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     """Do it; the exit code."""
-    from navapp.evaluation.campaign import CampaignFolder, run_campaign
-    from navapp.evaluation.results import write_results
+    from navapp.evaluation.paper.results import write_results
 
     if options.recording is not None:
         return _run_recording(options, diagnostics)
@@ -72,27 +76,21 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     if options.stress:
         return _run_stress(options, diagnostics)
     check_no_stress(options)
-    check_writable(options.json)
     settings = _read_settings(options)
-    n_processes = options.processes or min(4, os.cpu_count() or 1)
-    folder = CampaignFolder(options.out, settings)
-    diagnostics.note(f"{len(settings.tests)} tests, {n_processes} at a time, into {options.out}")
-
-    def tell(n_done: int, n_all: int, name: str) -> None:
-        diagnostics.progress("evaluating", n_done / n_all)
-        diagnostics.detail(f"{n_done} of {n_all}: {name}")
-
-    run_campaign(folder, settings, n_processes, tell)
-    content = write_results(folder, settings)
-    write_json(str(folder.path / "evaluate.json"), "evaluate", content)
-    write_json(options.json, "evaluate", content)
+    content = run_and_write(
+        settings,
+        lambda folder: write_results(folder, settings),
+        "evaluate.json",
+        options,
+        diagnostics,
+    )
     if options.json != "-":
         _say(content["summary"], options.out, diagnostics)
     return 0
 
 
 def _run_stress(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
-    from navapp.evaluation.cases import METHODS, SAMPLES, SITUATIONS, STAGE_NAMES
+    from navapp.evaluation.paper.cases import METHODS, SAMPLES, SITUATIONS, STAGE_NAMES
 
     usual = {
         "samples": list(SAMPLES), "stages": list(STAGE_NAMES), "situations": list(SITUATIONS),
@@ -105,7 +103,7 @@ def _run_stress(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
 
 
 def _run_recording(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
-    from navapp.evaluation.cases import METHODS, SAMPLES, SITUATIONS, STAGE_NAMES
+    from navapp.evaluation.paper.cases import METHODS, SAMPLES, SITUATIONS, STAGE_NAMES
 
     usual = {
         "samples": list(SAMPLES), "stages": list(STAGE_NAMES), "situations": list(SITUATIONS),
@@ -121,26 +119,12 @@ def _run_recording(options: argparse.Namespace, diagnostics: Diagnostics) -> int
     return run_recording(options, methods, diagnostics)
 
 
-def _read_settings(options: argparse.Namespace) -> "CampaignSettings":
-    from navapp.evaluation.campaign import CampaignSettings
-    from navapp.evaluation.cases import ALL_CASES, FIRST_SEED, METHODS, MOST_TESTS
+def _read_settings(options: argparse.Namespace) -> "TableSettings":
+    from navapp.evaluation.paper.cases import ALL_CASES, FIRST_SEED, METHODS, MOST_TESTS
+    from navapp.evaluation.paper.settings import TableSettings
 
-    if options.quick and (options.tests, options.frames) != (None, None):
-        raise UsageError(
-            f"--quick is one test of {_QUICK_FRAMES} frames of each case",
-            remedy="leave out --tests and --frames",
-        )
-    n_tests = 1 if options.quick else _or(options.tests, _TESTS)
-    n_frames = _QUICK_FRAMES if options.quick else _or(options.frames, _FRAMES)
-    if not 1 <= n_tests <= MOST_TESTS:
-        raise UsageError(f"--tests must be from 1 to {MOST_TESTS}")
-    if n_frames < 1:
-        raise UsageError("--frames must be at least 1")
-    if options.processes is not None and options.processes < 1:
-        raise UsageError("--processes must be at least 1")
-    seed = _or(options.seed, FIRST_SEED)
-    if seed < 0:
-        raise UsageError("--seed must not be negative")
+    usual = Counts(_TESTS, _FRAMES, FIRST_SEED)
+    counts = read_counts(options, usual, _QUICK_FRAMES, MOST_TESTS, "case")
     cases = tuple(
         case
         for case in ALL_CASES
@@ -149,11 +133,9 @@ def _read_settings(options: argparse.Namespace) -> "CampaignSettings":
         and case.situation in options.situations
     )
     methods = tuple(name for name in METHODS if name in options.methods)
-    return CampaignSettings(cases, methods, n_tests, n_frames, seed, options.quick)
-
-
-def _or(given: int | None, usual: int) -> int:
-    return usual if given is None else given
+    return TableSettings(
+        cases, methods, counts.tests, counts.frames, counts.first_seed, options.quick
+    )
 
 
 def _say(summary: dict[str, Any], out: str, diagnostics: Diagnostics) -> None:

@@ -12,7 +12,7 @@ from navapp.errors import ResultError, SequenceError, UsageError
 if TYPE_CHECKING:
     from navapp.cli.session_folder import RecordedSession
     from navapp.config import Configuration
-    from navapp.evaluation.recording import Studied
+    from navapp.evaluation.recording.study import Studied
     from navapp.tracking import Method
 
 _TRUTH, _PRIOR, _RIG = "truth.json", "prior.json", "rig.yml"
@@ -74,7 +74,7 @@ def run_recording(
 ) -> int:
     """Do it; the exit code."""
     from navapp.config import find_file, load
-    from navapp.evaluation.recording_report import check_folder, write_report
+    from navapp.evaluation.recording.report import check_folder, write_report
 
     check_writable(options.json)
     if options.fps is not None and not 0.0 < options.fps < float("inf"):
@@ -146,8 +146,8 @@ def _study(
     from navapp.cli.session_folder import is_session, read_session
     from navapp.control.prior_files import read_prior
     from navapp.control.stages import stage_by_name
-    from navapp.evaluation.recording import Study, open_frames, study
-    from navapp.evaluation.truth_files import check_truth, read_truth
+    from navapp.evaluation.recording.study import Study, open_frames, study
+    from navapp.evaluation.recording.truth_files import check_truth, read_truth
     from navapp.geometry.rig_files import read_rig
     from navapp.preop import read_plan
     from navapp.values import Prior

@@ -10,7 +10,7 @@ from navapp.errors import UsageError
 
 if TYPE_CHECKING:
     from navapp.control.frame_result import FrameResult
-    from navapp.evaluation.truth_files import PoseTruth
+    from navapp.evaluation.recording.truth_files import PoseTruth
     from navapp.values import Plan
 
 
@@ -27,7 +27,7 @@ def read_replay_truth(options: argparse.Namespace, plan: "Plan", bone: str) -> "
         UsageError: it holds no poses of bones.
     """
     from drivers.replay_camera import open_source
-    from navapp.evaluation.truth_files import PoseTruth, check_truth, read_truth
+    from navapp.evaluation.recording.truth_files import PoseTruth, check_truth, read_truth
 
     if options.truth is None:
         return None

@@ -1,15 +1,13 @@
 """Reads poses of a tracked tool: JSON, or CSV with a time and 16 numbers per line."""
 
-import csv
 import json
 from pathlib import Path
 
 import numpy as np
 
 from navapp.errors import InputError
+from navapp.geometry.pose_tables import parse_pose_table
 from navapp.geometry.transform import FloatArray, RigidTransform
-
-_N_COLUMNS = 17
 
 
 def read_tool_poses(path: str | Path) -> FloatArray:
@@ -47,23 +45,10 @@ def _from_json(text: str) -> list[FloatArray]:
 
 
 def _from_csv(text: str) -> list[FloatArray]:
-    lines = [line for line in csv.reader(text.splitlines()) if "".join(line).strip()]
-    if lines and not _is_number(lines[0][0]):
-        lines = lines[1:]
-    matrices = []
-    for number, line in enumerate(lines):
-        if len(line) != _N_COLUMNS:
-            raise ValueError(f"pose {number} has {len(line)} numbers, {_N_COLUMNS} are expected")
-        matrices.append(np.array([float(word) for word in line[1:]]).reshape(4, 4))
-    return matrices
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
+    rows = parse_pose_table(text)
+    if len(rows[0][0]) != 1:
+        raise ValueError(f"pose 0 has {len(rows[0][0])} columns before its matrix, 1 is expected")
+    return [matrix for _, matrix in rows]
 
 
 def _rigid(number: int, matrix: FloatArray) -> FloatArray:

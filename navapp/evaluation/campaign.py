@@ -2,17 +2,15 @@
 
 import json
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import cache, partial
 from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar
 
-from navapp import __version__
 from navapp.errors import InputError, UsageError
-from navapp.evaluation.cases import Case, CaseTest, list_tests
 from navapp.evaluation.following import follow
 from navapp.evaluation.scores import Followed
-from navapp.evaluation.sequence import KnownSequence, render_test
+from navapp.evaluation.sequence import KnownSequence
 from navapp.evaluation.workers import run_in_processes
 from navapp.evaluation.worst_frame import draw_worst_frame
 from navapp.geometry.whole_files import write_whole
@@ -46,9 +44,8 @@ class Campaign(Protocol[T]):
         """That follow every test."""
         ...
 
-    @property
-    def n_frames(self) -> int:
-        """That count, of each test."""
+    def count_frames(self, test: T) -> int:
+        """How many count, of a test."""
         ...
 
     @property
@@ -72,41 +69,6 @@ class Campaign(Protocol[T]):
     def to_json(self) -> dict[str, Any]:
         """Named values; a folder is of one campaign only."""
         ...
-
-
-@dataclass(frozen=True, slots=True)
-class CampaignSettings:
-    """What is run; another campaign in the same folder must have the same."""
-
-    cases: tuple[Case, ...]
-    methods: tuple[Method, ...]
-    n_tests: int  # of each case
-    n_frames: int  # of each test, after the one that is registered in
-    first_seed: int
-    is_quick: bool = False
-
-    def to_json(self) -> dict[str, Any]:
-        """Named values, with the version that has them."""
-        return {
-            "navapp": __version__,
-            "cases": [case.name for case in self.cases],
-            **{key: value for key, value in asdict(self).items() if key != "cases"},
-            "methods": list(self.methods),
-        }
-
-    @property
-    def tests(self) -> tuple[CaseTest, ...]:
-        """All tests."""
-        return tuple(list_tests(self.cases, self.n_tests, self.first_seed))
-
-    @property
-    def timed_tests(self) -> tuple[CaseTest, ...]:
-        """The first of each case; none for a quick look, whose times are those of its tests."""
-        return () if self.is_quick else self.tests[:: self.n_tests]
-
-    def render(self, test: CaseTest, n_frames: int) -> KnownSequence:
-        """The pictures of a test, and one before them."""
-        return render_test(test, n_frames + 1)
 
 
 @dataclass(frozen=True, slots=True)
@@ -228,7 +190,7 @@ def run_test(folder: CampaignFolder[T], settings: Campaign[T], test: T, *, is_ti
     """Render a test and follow it with every method; the file appears when all is done."""
     if is_timed:
         _warm_up(settings)
-    sequence = settings.render(test, settings.n_frames)
+    sequence = settings.render(test, settings.count_frames(test))
     answers = {method: follow(sequence, method) for method in settings.methods}
     if not is_timed and "bimcc" in answers:
         picture = draw_worst_frame(sequence, answers["bimcc"])

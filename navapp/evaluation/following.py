@@ -17,7 +17,7 @@ from navapp.control.specification import specify_session
 from navapp.control.states import SessionState, Snapshot
 from navapp.devices import make_memory_devices
 from navapp.devices.simulated_room import make_sensor
-from navapp.evaluation.noise_limit_frame import measure_budget
+from navapp.evaluation.noise_limit.frame import measure_budget
 from navapp.evaluation.pose_errors import measure_pose
 from navapp.evaluation.predicted_errors import predict_errors_mm
 from navapp.evaluation.scores import ErrorBudget, Followed, FrameScore

@@ -9,7 +9,6 @@ from navapp.config import Configuration
 from navapp.control.stages import stage_by_name
 from navapp.devices import open_live
 from navapp.devices.simulated_plan import make_built_in_plan, make_nominal_prior
-from navapp.evaluation.cases import CaseTest
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.values import Plan, Prior, StageSpec
@@ -32,11 +31,6 @@ class KnownSequence:
     is_simulated: bool = True
     # (N, 3) where the stage's targets really are in the bone; None: where the plan has them.
     true_targets_mm: FloatArray | None = None
-
-
-def render_test(test: CaseTest, n_frames: int) -> KnownSequence:
-    """The pictures of a simulated test."""
-    return render_room(test.configure(), test.case.stage, n_frames)
 
 
 def render_room(configuration: Configuration, stage_name: str, n_frames: int) -> KnownSequence:

@@ -16,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.control.stages import stage_by_name
-from navapp.evaluation.cases import SAMPLES, Case, CaseTest
 from navapp.evaluation.following import follow
-from navapp.evaluation.sequence import KnownSequence, render_test
+from navapp.evaluation.paper.cases import SAMPLES, Case, CaseTest
+from navapp.evaluation.sequence import KnownSequence
 from navapp.registration import RegistrationModel
 from navapp.stereo import refine_on_model
 from navapp.stereo.matte_pictures import make_matte_pair
@@ -53,7 +53,7 @@ def _render(stage: str, first: int, n_knees: int) -> Iterator[KnownSequence]:
     samples = tuple(SAMPLES)
     for number in range(n_knees):
         case = Case(samples[number % len(samples)], stage_by_name(stage).name, "overlay")
-        yield render_test(CaseTest(case, number, first + number), _FRAMES)
+        yield CaseTest(case, number, first + number).render(_FRAMES)
 
 
 def measure_spreads(sequence: KnownSequence) -> dict[str, float]:

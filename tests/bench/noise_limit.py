@@ -21,7 +21,7 @@ from navapp.config import Configuration
 from navapp.config.camera_sections import CameraSection, SimulationSection
 from navapp.control.stages import STAGES
 from navapp.evaluation.following import follow
-from navapp.evaluation.noise_limit_frame import measure_budget
+from navapp.evaluation.noise_limit.frame import measure_budget
 from navapp.evaluation.sequence import render_room
 from navapp.geometry.rectification import rectifier_of
 from navapp.registration import RegistrationModel

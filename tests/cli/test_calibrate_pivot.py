@@ -44,7 +44,7 @@ def test_csv_with_and_without_a_header_and_json_are_the_same(given, tmp_path) ->
     [
         ("p.csv", "", "no poses"),
         ("p.csv", HEADER + "\n", "no poses"),
-        ("p.csv", "1,2,3\n", "pose 0 has 3 numbers"),
+        ("p.csv", "1,2,3\n", "pose 0 has 3 columns"),
         ("p.csv", "1," + ",".join(["x"] * 16) + "\n", "could not convert"),
         ("p.csv", "1," + ",".join(["1.0"] * 16) + "\n", "pose 0, tracker_from_tool"),
         ("p.csv", "1," + ",".join(["nan"] * 16) + "\n", "pose 0, tracker_from_tool"),

@@ -8,9 +8,10 @@ import pytest
 
 from drivers.child_python import make_child_environment
 from navapp.cli.main import run
-from navapp.evaluation import campaign, stress_results
-from navapp.evaluation.stress_axes import AXES, FIRST_STRESS_SEED
-from navapp.evaluation.stress_matrix import StressSettings
+from navapp.evaluation import campaign
+from navapp.evaluation.stress import results
+from navapp.evaluation.stress.axes import AXES, FIRST_STRESS_SEED
+from navapp.evaluation.stress.matrix import StressSettings
 
 
 @pytest.fixture
@@ -20,7 +21,7 @@ def ran(monkeypatch) -> list[StressSettings]:
     summary = {"quick": False, "judged": {"ok": 0, "frames": 0, "wrong_and_ok": 0},
                "wrong_and_ok_on": []}  # fmt: skip
     monkeypatch.setattr(campaign, "run_campaign", lambda _, settings, *__: kept.append(settings))
-    monkeypatch.setattr(stress_results, "write_stress", lambda *_: {"summary": summary})
+    monkeypatch.setattr(results, "write_stress", lambda *_: {"summary": summary})
     return kept
 
 

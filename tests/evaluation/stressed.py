@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 from navapp.evaluation.campaign import Done
 from navapp.evaluation.scores import FrameScore
-from navapp.evaluation.stress_matrix import StressTest
+from navapp.evaluation.stress.matrix import StressTest
 from tests.evaluation.scored import followed
 
 

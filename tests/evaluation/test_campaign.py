@@ -9,12 +9,14 @@ import pytest
 
 from navapp.errors import InputError, UsageError
 from navapp.evaluation import campaign
-from navapp.evaluation.campaign import CampaignFolder, CampaignSettings, run_campaign
-from navapp.evaluation.cases import ALL_CASES
-from navapp.evaluation.results import write_results
+from navapp.evaluation.campaign import CampaignFolder, run_campaign
+from navapp.evaluation.paper import settings as settings_of_tables
+from navapp.evaluation.paper.cases import ALL_CASES, CaseTest
+from navapp.evaluation.paper.results import write_results
+from navapp.evaluation.paper.settings import TableSettings
 from tests.evaluation.scored import followed, score
 
-SETTINGS = CampaignSettings(ALL_CASES[:2], ("paper", "bimcc"), 2, 3, 1)
+SETTINGS = TableSettings(ALL_CASES[:2], ("paper", "bimcc"), 2, 3, 1)
 NAMES = [test.name for test in SETTINGS.tests]
 
 
@@ -55,10 +57,10 @@ def line(monkeypatch) -> Iterator[Line]:
             yield item
 
     for name, value in (
-        ("run_in_processes", run_here), ("render_test", line.render), ("follow", line.follow),
-        ("draw_worst_frame", line.draw),
+        ("run_in_processes", run_here), ("follow", line.follow), ("draw_worst_frame", line.draw),
     ):  # fmt: skip
         monkeypatch.setattr(campaign, name, value)
+    monkeypatch.setattr(CaseTest, "render", lambda test, n_frames: line.render(test, n_frames))
     campaign._warm_up.cache_clear()
     yield line
     campaign._warm_up.cache_clear()
@@ -162,7 +164,7 @@ def test_other_settings_are_refused_and_change_nothing(line, tmp_path, other) ->
 
 def test_another_version_is_another_evaluation(line, tmp_path, monkeypatch) -> None:
     run(tmp_path)
-    monkeypatch.setattr(campaign, "__version__", "99")
+    monkeypatch.setattr(settings_of_tables, "__version__", "99")
     with pytest.raises(UsageError, match="another evaluation"):
         CampaignFolder(tmp_path, SETTINGS)
 
@@ -227,7 +229,7 @@ def test_results_are_those_of_the_kept_files(line, tmp_path) -> None:
     assert ours["tre_mm"] == pytest.approx(0.1015)
     assert (ours["seeds"], ours["frames"]) == ([101, 102], 6)
     assert content["summary"]["tests"] == content["summary"]["of"] == 4
-    assert "these frames are 0.2 s of the room" in (tmp_path / "tables.md").read_text()
+    assert "tests with an instrument have 90 frames" in (tmp_path / "tables.md").read_text()
     lines = (tmp_path / "frames.csv").read_text().splitlines()
     assert len(lines) == 1 + 4 * 2 * 3
     first = dict(zip(lines[0].split(","), lines[1].split(","), strict=True))

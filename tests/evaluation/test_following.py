@@ -12,9 +12,9 @@ from navapp.control.controller import SessionController
 from navapp.control.stages import STAGES
 from navapp.control.states import SessionState
 from navapp.evaluation import following
-from navapp.evaluation.cases import Case, CaseTest
 from navapp.evaluation.following import Follower, follow
-from navapp.evaluation.sequence import KnownSequence, render_test
+from navapp.evaluation.paper.cases import Case, CaseTest
+from navapp.evaluation.sequence import KnownSequence
 from navapp.evaluation.worst_frame import draw_worst_frame
 from navapp.values import Prior
 from tests.control.fakes import (
@@ -200,7 +200,7 @@ def test_nothing_of_the_truth_is_handed_to_the_session(script, monkeypatch) -> N
 @pytest.fixture(scope="module")
 def knee() -> KnownSequence:
     """A simulated knee under an instrument, four frames of it."""
-    return render_test(CaseTest(Case("man", "drilling", "instrument"), 0, 1), 4)
+    return CaseTest(Case("man", "drilling", "instrument"), 0, 1).render(4)
 
 
 @pytest.mark.slow

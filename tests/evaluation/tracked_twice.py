@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from navapp.evaluation.truth_files import TrackerTruth
+from navapp.evaluation.recording.truth_files import TrackerTruth
 from navapp.geometry.transform import FloatArray, RigidTransform, rotation_from_vector
 
 LEFT_FROM_TRACKER = RigidTransform.from_parts(

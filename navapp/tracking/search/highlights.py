@@ -11,13 +11,13 @@ from functools import partial
 
 import numpy as np
 
+from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.transform import RigidTransform
-from navapp.geometry.zbuffer import find_known_range
 from navapp.stereo import refine_on_model
 from navapp.stereo.matte_pictures import make_matte_pair
 from navapp.tracking.following import Follower
-from navapp.tracking.frame import Fit, Frame, RectifyBox
-from navapp.tracking.surface_meter import Expected, Measurement, SurfaceMeter
+from navapp.tracking.frame import Fit, Frame
+from navapp.tracking.surface_meter import NEAR_VIEW, Expected, Measurement, SurfaceMeter
 from navapp.values import DisparityMap
 
 # Where pictures without highlights answer nothing, grey ones are off by so many of the standard
@@ -30,8 +30,6 @@ _LEAST_CONTRADICTION = 0.75
 # than in grey, on glossy patellas 0.96 of them and more.
 _LEAST_ANSWERED = 0.95
 _MAD_TO_SIGMA = 1.4826
-# Matching windows reach so far beyond the box, and a step so far beyond the support.
-_WINDOW_PX, _STEP_PX = 12, 3.0
 
 
 class HighlightSearch:
@@ -49,26 +47,22 @@ class HighlightSearch:
 
         None of grey pictures, and of pictures without colour.
         """
-        if frame.rectify_coloured is None:
+        region = self._meter.find_region(pose, NEAR_VIEW)
+        if frame.rectify_coloured is None or region is None:
             return
-        measure = partial(self._measure, rectify=frame.rectify_coloured)
+        measure = partial(self._measure, coloured=frame.rectify_coloured(*region))
         fit = Follower(self._meter, measure=measure).follow(frame, pose, skips_samples=True)
         if fit is not None:
             yield fit
 
-    def _measure(self, expected: Expected, rectify: RectifyBox) -> Measurement:
-        support_px = expected.support_px
-        grey = refine_on_model(expected.pair, support_px)
-        nearest_px, farthest_px = find_known_range(support_px)
-        reach_px = nearest_px - _STEP_PX, farthest_px + _STEP_PX
-        coloured = rectify(expected.pair.box.grow(_WINDOW_PX), reach_px)
-        coloured = replace(coloured, box=expected.pair.box)
-        matte = make_matte_pair(coloured, np.isfinite(support_px))
-        found = grey
+    def _measure(self, expected: Expected, coloured: RectifiedPair) -> Measurement:
+        support_px, box = expected.support_px, expected.pair.box
+        found = refine_on_model(expected.pair, support_px)
+        matte = make_matte_pair(replace(coloured, box=box), np.isfinite(support_px))
         if matte is not None:
             without = refine_on_model(matte, support_px)
-            if are_highlights_seen(grey, without):
-                found = join_maps(grey, without)
+            if are_highlights_seen(found, without):
+                found = join_maps(found, without)
         return self._meter.take_on_model(expected, found)
 
 

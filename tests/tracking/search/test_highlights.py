@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from navapp.evaluation.cases import Case, CaseTest
-from navapp.evaluation.sequence import KnownSequence, render_test
+from navapp.evaluation.paper.cases import Case, CaseTest
+from navapp.evaluation.sequence import KnownSequence
 from navapp.registration.verdict import Goal
 from navapp.tracking import TrackState, make_tracker
 from navapp.tracking.search.highlights import join_maps, measure_contradiction
@@ -39,7 +39,7 @@ def test_maps_contradict_each_other_beyond_what_both_claim() -> None:
 @pytest.fixture(scope="module")
 def patella() -> KnownSequence:
     """One whose highlights leave too little of it to be believed."""
-    return render_test(CaseTest(Case("woman", "patella", "overlay"), 0, 2_000_001), 1)
+    return CaseTest(Case("woman", "patella", "overlay"), 0, 2_000_001).render(1)
 
 
 def look(sequence: KnownSequence, *, is_grey: bool) -> TrackedFrame:

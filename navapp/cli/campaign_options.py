@@ -1,0 +1,94 @@
+"""What the tables and the stress matrix of `navapp evaluate` share: counts, running, results."""
+
+import argparse
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
+from navapp.errors import UsageError
+
+if TYPE_CHECKING:
+    from navapp.evaluation.campaign import Campaign, CampaignFolder
+
+
+@dataclass(frozen=True, slots=True)
+class Counts:
+    """How much is run."""
+
+    tests: int  # knees of a case, or of a level
+    frames: int  # of each, after the one that is registered in
+    first_seed: int
+
+
+def read_counts(
+    options: argparse.Namespace, usual: Counts, quick_frames: int, most_tests: int, what: str
+) -> Counts:
+    """Of --tests, --frames, --seed and --quick.
+
+    Args:
+        options: of the command line.
+        usual: what counts where an option is left out.
+        quick_frames: of a quick look, with one test.
+        most_tests: that have seeds of their own.
+        what: has that test, for messages: `case`, `level`.
+
+    Raises:
+        UsageError: a number that cannot be, or --quick beside it.
+    """
+    if options.quick and (options.tests, options.frames) != (None, None):
+        raise UsageError(
+            f"--quick is one knee and {quick_frames} frames a {what}",
+            remedy="leave out --tests and --frames",
+        )
+    tests = 1 if options.quick else _or(options.tests, usual.tests)
+    frames = quick_frames if options.quick else _or(options.frames, usual.frames)
+    seed = _or(options.seed, usual.first_seed)
+    if not 1 <= tests <= most_tests:
+        raise UsageError(f"--tests must be from 1 to {most_tests}")
+    if frames < 1:
+        raise UsageError("--frames must be at least 1")
+    if options.processes is not None and options.processes < 1:
+        raise UsageError("--processes must be at least 1")
+    if seed < 0:
+        raise UsageError("--seed must not be negative")
+    return Counts(tests, frames, seed)
+
+
+def run_and_write(
+    settings: "Campaign[Any]",
+    write: "Callable[[CampaignFolder[Any]], dict[str, Any]]",
+    file_name: str,
+    options: argparse.Namespace,
+    diagnostics: Diagnostics,
+) -> dict[str, Any]:
+    """Run a campaign in its folder, and write what it has found; the content for programs.
+
+    Args:
+        settings: of the campaign.
+        write: tables and reports, from what is in the folder.
+        file_name: of the content in the folder.
+        options: of the command line.
+        diagnostics: told how far it is.
+    """
+    from navapp.evaluation.campaign import CampaignFolder, run_campaign
+
+    check_writable(options.json)
+    n_processes = options.processes or min(4, os.cpu_count() or 1)
+    folder: CampaignFolder[Any] = CampaignFolder(options.out, settings)
+    diagnostics.note(f"{len(settings.tests)} tests, {n_processes} at a time, into {options.out}")
+
+    def tell(n_done: int, n_all: int, name: str) -> None:
+        diagnostics.progress("evaluating", n_done / n_all)
+        diagnostics.detail(f"{n_done} of {n_all}: {name}")
+
+    run_campaign(folder, settings, n_processes, tell)
+    content = write(folder)
+    write_json(str(folder.path / file_name), "evaluate", content)
+    write_json(options.json, "evaluate", content)
+    return content
+
+
+def _or(given: int | None, usual: int) -> int:
+    return usual if given is None else given

@@ -1,0 +1,1 @@
+"""The judge as a rejector, and how far its bounds can be believed."""

@@ -1,0 +1,1 @@
+"""The least error that the pictures' noise allows a pose."""

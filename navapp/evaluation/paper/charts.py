@@ -1,0 +1,106 @@
+"""Bar charts after the paper's figures 5 and 6: processing time and error by situation."""
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from calibration.report.plots import draw_svg
+from navapp.evaluation.paper.cases import SITUATIONS, SituationName
+from navapp.evaluation.paper.published import Published, find_published
+from navapp.evaluation.paper.rows import Row
+from navapp.geometry.transform import FloatArray
+from navapp.tracking import Method
+
+_METHODS: dict[Method, tuple[str, str]] = {
+    "icp": ("icp", "#718096"),
+    "paper": ("paper", "#c05621"),
+    "bimcc": ("bimcc", "#2b6cb0"),
+}
+_SHORT: dict[SituationName, str] = {
+    "registration": "registration",
+    "overlay": "overlay",
+    "patient": "patient moves",
+    "instrument": "instrument moves",
+}
+# What the method has lost would hide all others.
+_MOST_MM = 2.0
+
+
+def draw_rates(rows: Sequence[Row]) -> str:
+    """Frames a second by situation, median of the cases; SVG."""
+    return _draw(
+        rows,
+        lambda row: row.fps,
+        (lambda told: told.icp_fps, lambda told: told.paper_fps),
+        "frames a second, median",
+        None,
+    )
+
+
+def draw_errors(rows: Sequence[Row]) -> str:
+    """Overlay error by situation, median of the cases; SVG."""
+    return _draw(
+        rows,
+        lambda row: row.overlay_mm,
+        (lambda told: told.icp_mm, lambda told: told.paper_mm),
+        "overlay error, mm, median",
+        _MOST_MM,
+    )
+
+
+def _draw(
+    rows: Sequence[Row],
+    value_of: Callable[[Row], float | None],
+    published: tuple[Callable[[Published], float], Callable[[Published], float]],
+    label: str,
+    most: float | None,
+) -> str:
+    bars = [
+        ("state of the art, as printed", "#cbd5e0", _middle_printed(rows, published[0])),
+        ("proposal, as printed", "#fbd38d", _middle_printed(rows, published[1])),
+    ]
+    for method, (name, colour) in _METHODS.items():
+        bars.append((f"{name}, here", colour, _middle(rows, method, value_of)))
+
+    def draw(figure: Any) -> None:
+        axes = figure.add_subplot()
+        for number, (name, colour, heights) in enumerate(bars):
+            places = np.arange(len(SITUATIONS)) + 0.16 * (number - 2)
+            is_known = np.isfinite(heights)
+            shown = np.minimum(heights, math.inf if most is None else most)
+            axes.bar(places[is_known], shown[is_known], 0.15, color=colour, label=name)
+            for place, height, top in zip(places, heights, shown, strict=True):
+                # No bar looks like one of height 0, the best of all; a cut one is higher.
+                told = "none" if math.isnan(height) else f"{height:.1f}" if height > top else ""
+                axes.text(place, np.nan_to_num(top), told, ha="center", va="bottom", fontsize=6)
+        axes.set_xticks(np.arange(len(SITUATIONS)), [_SHORT[one] for one in SITUATIONS], fontsize=8)
+        axes.set(ylabel=label)
+        axes.legend(frameon=False, fontsize=7, ncols=3, loc="upper left")
+        axes.margins(y=0.3)
+
+    return draw_svg(draw, (9.6, 3.2))
+
+
+def _middle(
+    rows: Sequence[Row], method: Method, value_of: Callable[[Row], float | None]
+) -> FloatArray:
+    """Median of the cases with a value, by situation; NaN of none."""
+    known = [
+        (row.case.situation, value)
+        for row in rows
+        if row.method == method and (value := value_of(row)) is not None
+    ]
+    return _median_by_situation(known)
+
+
+def _middle_printed(rows: Sequence[Row], get: Callable[[Published], float]) -> FloatArray:
+    """The same of the paper's figures, of the cases that were run."""
+    cases = {row.case for row in rows}
+    return _median_by_situation([(one.situation, get(find_published(one))) for one in cases])
+
+
+def _median_by_situation(values: Sequence[tuple[SituationName, float]]) -> FloatArray:
+    parts = [[value for name, value in values if name == situation] for situation in SITUATIONS]
+    return np.array([np.median(part) if part else math.nan for part in parts])

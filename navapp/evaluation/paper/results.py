@@ -1,0 +1,156 @@
+"""Writes what a campaign has found: tables, report, JSON and every frame as CSV."""
+
+import csv
+import io
+import os
+import platform
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from navapp import __version__
+from navapp.evaluation.campaign import CampaignFolder, Done
+from navapp.evaluation.judge.findings import JudgeFindings, examine_judge
+from navapp.evaluation.paper.cases import INSTRUMENT_S, SWEEP_FRAMES, Case, CaseTest
+from navapp.evaluation.paper.report import make_report
+from navapp.evaluation.paper.rows import Row, make_row
+from navapp.evaluation.paper.settings import TableSettings
+from navapp.evaluation.paper.summary import Judged, compare_with_paper, judge_method
+from navapp.evaluation.paper.tables import make_tables
+from navapp.evaluation.scores import LEVELS, FrameScore
+from navapp.geometry.whole_files import write_whole
+
+_COLUMNS = (
+    "index", "status", "tre_mm", "displacement_mm", "outline_mm", "bound_mm", "seen", "hidden",
+    "total_ms", "is_search", "rms_ratio",
+)  # fmt: skip
+_CLAIMED_COLUMNS = tuple(f"claimed_{100.0 * level:.0f}_mm" for level in LEVELS)
+_BUDGET_COLUMNS = ("limit_mm", "ideal_mm", "matched_mm", "reached_mm")
+
+
+def write_results(folder: CampaignFolder[CaseTest], settings: TableSettings) -> dict[str, Any]:
+    """Write `tables.md`, `report.html` and `frames.csv` of what is done; the rows for programs."""
+    done = list(folder.read(is_timed=False))
+    timed = done if settings.is_quick else list(folder.read(is_timed=True))
+    rows = [
+        make_row(case, method, _of(case, done), _of(case, timed))
+        for case in settings.cases
+        for method in settings.methods
+        if _of(case, done)
+    ]
+    judged = [judge_method(method, done) for method in settings.methods]
+    findings = _examine(done)
+    tables = make_tables(
+        rows,
+        judged,
+        _about(settings, done),
+        findings.to_lines(),
+        is_quick=settings.is_quick,
+    )
+    write_whole(folder.path / "tables.md", tables.encode())
+    pictures = _find_pictures(folder, settings, done)
+    report = make_report(tables, rows, pictures, findings.draw())
+    write_whole(folder.path / "report.html", report.encode())
+    write_whole(folder.path / "frames.csv", _make_csv(done).encode())
+    return {
+        "rows": [row.to_json() for row in rows],
+        "summary": _summarise(rows, judged, settings, done) | findings.to_json(),
+    }
+
+
+def _of(case: Case, done: Sequence[Done[CaseTest]]) -> list[Done[CaseTest]]:
+    return [one for one in done if one.test.case == case]
+
+
+def _examine(done: Sequence[Done[CaseTest]]) -> JudgeFindings:
+    """Our method alone: the judge was made for it."""
+    knees: dict[str, list[Sequence[FrameScore]]] = {}
+    for one in done:
+        if "bimcc" in one.followed:
+            frames = one.followed["bimcc"].frames
+            knees.setdefault(one.test.case.situation, []).append(frames)
+    return examine_judge(knees)
+
+
+def _about(settings: TableSettings, done: Sequence[Done[CaseTest]]) -> list[str]:
+    return [
+        f"navapp {__version__}, Python {platform.python_version()}, {platform.machine()}, "
+        f"{os.cpu_count()} cores",
+        f"{len(done)} of {len(settings.tests)} tests, each another knee, {settings.n_frames} "
+        f"frames each after the registration; first seed {settings.first_seed}",
+        _tell_sweep(settings),
+        "age changes the fine relief of the simulated bones only: 0.10 mm (20 to 30) against "
+        "0.15 mm (35 to 45), root mean square",
+        "simulated devices; research software, not for clinical use",
+    ]
+
+
+def _tell_sweep(settings: TableSettings) -> str:
+    """How much of an instrument's passing the tests have."""
+    if settings.is_quick:
+        return (
+            f"a quick look ends before an instrument comes, {INSTRUMENT_S[0]:g} s after the start"
+        )
+    return (
+        f"tests with an instrument have {max(settings.n_frames, SWEEP_FRAMES)} frames: it lies "
+        f"before the bone from {INSTRUMENT_S[0]:g} to {INSTRUMENT_S[1]:g} s, and has passed once"
+    )
+
+
+def _summarise(
+    rows: Sequence[Row],
+    judged: Sequence[Judged],
+    settings: TableSettings,
+    done: Sequence[Done[CaseTest]],
+) -> dict[str, Any]:
+    return {
+        "tests": len(done),
+        "of": len(settings.tests),
+        "quick": settings.is_quick,
+        "judged": {one.method: one.to_json() for one in judged},
+        "beside_the_paper": compare_with_paper(rows),
+    }
+
+
+def _find_pictures(
+    folder: CampaignFolder[CaseTest], settings: TableSettings, done: Sequence[Done[CaseTest]]
+) -> dict[Case, bytes]:
+    """Of each case that of the test with the worst frame that is OK."""
+    pictures = {}
+    for case in settings.cases:
+        with_picture = [one for one in _of(case, done) if folder.picture_of(one.test).is_file()]
+        if with_picture:
+            worst = max(with_picture, key=_worst_mm)
+            pictures[case] = Path(folder.picture_of(worst.test)).read_bytes()
+    return pictures
+
+
+def _worst_mm(done: Done[CaseTest]) -> float:
+    ours = done.followed.get("bimcc")
+    frames = () if ours is None else ours.frames
+    return max((one.tre_mm or 0.0 for one in frames if one.is_ok), default=0.0)
+
+
+def _make_csv(done: Sequence[Done[CaseTest]]) -> str:
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(
+        ("sample", "stage", "situation", "test", "seed", "method", *_COLUMNS, "reasons",
+         *_CLAIMED_COLUMNS, *_BUDGET_COLUMNS)
+    )  # fmt: skip
+    for one in done:
+        case = one.test.case
+        for method, followed in one.followed.items():
+            for frame in followed.frames:
+                values = (getattr(frame, name) for name in _COLUMNS)
+                writer.writerow(
+                    (case.sample, case.stage, case.situation, one.test.number, one.test.seed,
+                     method, *values, "; ".join(frame.reasons), *_tell_more(frame))
+                )  # fmt: skip
+    return out.getvalue()
+
+
+def _tell_more(frame: FrameScore) -> list[float | None]:
+    """The bounds at all levels, and the error budget."""
+    claimed = [None] * len(LEVELS) if frame.claimed_mm is None else [*frame.claimed_mm]
+    return [*claimed, *(getattr(frame.budget, name, None) for name in _BUDGET_COLUMNS)]

@@ -1,0 +1,1 @@
+"""Anyone's recording judged by a known truth."""

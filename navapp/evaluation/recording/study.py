@@ -1,0 +1,230 @@
+"""Methods on a recording, scored against what is known of where the bone was."""
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+
+from drivers.frames import StereoFrame
+from drivers.recorded_sources import RecordedSource
+from drivers.replay_camera import open_source
+from navapp.config import Configuration
+from navapp.errors import RigError
+from navapp.evaluation.following import Answers, follow
+from navapp.evaluation.pose_errors import measure_pose
+from navapp.evaluation.recording.divots import measure_divots
+from navapp.evaluation.recording.other_tracker import SolvedFrames, find_poses, solve_frames
+from navapp.evaluation.recording.truth_files import DivotTruth, PoseTruth, Truth
+from navapp.evaluation.scores import FrameScore
+from navapp.evaluation.sequence import KnownSequence
+from navapp.evaluation.worst_frame import draw_frame
+from navapp.geometry.rectification import rectifier_of
+from navapp.geometry.rig import StereoRig
+from navapp.geometry.transform import RigidTransform
+from navapp.tracking import Method
+from navapp.values import Plan, Prior, StageSpec
+
+# So many of the worst frames are drawn.
+_N_PICTURES = 3
+
+
+class RecordedFrames(Sequence[StereoFrame]):
+    """The pairs of a recording, each loaded when it is asked for.
+
+    Args:
+        source: open, and kept open by who opened it.
+        rig: that took them.
+        rate_hz: where the source has neither times nor a rate.
+        on_load: told how many pairs there are, whenever one is loaded.
+    """
+
+    def __init__(
+        self,
+        source: RecordedSource,
+        rig: StereoRig,
+        rate_hz: float,
+        on_load: Callable[[int], None] = lambda n_frames: None,
+    ) -> None:
+        self._source, self._rig, self._on_load = source, rig, on_load
+        self.numbers = source.numbers
+        period_ns = 1e9 / (source.rate_hz or rate_hz)
+        times = source.times
+        self.has_times = times is not None
+        self.times_ns = tuple(
+            round(place * period_ns) if times is None else times[place].captured_ns
+            for place in range(len(source.numbers))
+        )
+
+    def __len__(self) -> int:
+        return len(self.numbers)
+
+    def __getitem__(self, place: int) -> StereoFrame:  # type: ignore[override]
+        self._on_load(len(self))
+        left, right = self._source.load(place)
+        times, number = self._source.times, self.numbers[place]
+        captured_ns = self.times_ns[place]
+        skew_ns = 0 if times is None else times[place].skew_ns
+        return StereoFrame(
+            left, right, captured_ns, captured_ns + max(skew_ns, 0), skew_ns,
+            sequence=number, rig_id=self._rig.rig_id, source_index=number,
+            row_delay_ns=self._rig.row_delay_ns,
+        )  # fmt: skip
+
+
+@contextmanager
+def open_frames(
+    source: str, rig: StereoRig, rate_hz: float, on_load: Callable[[int], None]
+) -> Iterator[RecordedFrames]:
+    """The frames of a folder of pairs, a session folder or two videos, as `RecordedFrames` says.
+
+    Raises:
+        SequenceError: nothing there, unpaired, damaged.
+        RigError: pictures of another size than the rig's.
+    """
+    opened = open_source(source)
+    try:
+        frames = RecordedFrames(opened, rig, rate_hz, on_load)
+        height, width = frames[0].left.shape[:2]
+        if (width, height) != (rig.width, rig.height):
+            raise RigError(
+                f"the pictures of {source} are {width}x{height}, the rig was calibrated at "
+                f"{rig.width}x{rig.height}",
+                subject=source,
+                remedy="use the rig file that belongs to these pictures",
+            )
+        yield frames
+    finally:
+        opened.close()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Study:
+    """What every method is given, and the truth that none is given."""
+
+    name: str  # of the recording
+    frames: RecordedFrames
+    truth: Truth
+    configuration: Configuration
+    rig: StereoRig
+    plan: Plan
+    prior: Prior
+    stage: StageSpec
+
+    def to_sequence(self, truth: Sequence[RigidTransform | None] = ()) -> KnownSequence:
+        """The recording with true poses, as far as they are known."""
+        return KnownSequence(
+            self.frames,
+            truth or (None,) * len(self.frames),
+            self.configuration,
+            self.rig,
+            self.plan,
+            self.prior,
+            self.stage,
+            is_simulated=False,
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Studied:
+    """What came of a recording."""
+
+    name: str
+    stage: str
+    bone: str
+    truth: Truth
+    has_times: bool
+    known: frozenset[int]  # pictures whose poses can be scored
+    answers: dict[Method, Answers]  # their scores have the pictures' own numbers
+    leading: Method  # ours, unless it was not asked for
+    solved: SolvedFrames | None  # of another tracker, with the leading method's poses
+    pictures: tuple[tuple[FrameScore, bytes], ...]  # its worst frames
+
+
+def study(given: Study, methods: Sequence[Method]) -> Studied:
+    """Follow the bone with each method, then score all alike.
+
+    Raises:
+        ResultError: the truth's own frames cannot be solved.
+        SequenceError: a picture cannot be read.
+    """
+    answers = {method: follow(given.to_sequence(), method) for method in methods}
+    # Ours leads, because its judge tells which poses may be solved with.
+    leading: Method = "bimcc" if "bimcc" in answers else methods[0]
+    poses, solved = _find_truth(given, answers[leading])
+    scored = {method: _score(given, one, poses) for method, one in answers.items()}
+    return Studied(
+        given.name,
+        given.stage.name,
+        given.stage.bone,
+        given.truth,
+        given.frames.has_times,
+        _find_known(given, poses),
+        {method: _number(one, given.frames.numbers) for method, one in scored.items()},
+        leading,
+        solved,
+        tuple(_draw_worst(given, scored[leading], poses)),
+    )
+
+
+def _find_truth(
+    given: Study, leading: Answers
+) -> tuple[list[RigidTransform | None], SolvedFrames | None]:
+    """True poses in the pictures, left camera from bone; None where they are not known."""
+    truth, frames = given.truth, given.frames
+    if isinstance(truth, DivotTruth):
+        return [None] * len(frames), None
+    if isinstance(truth, PoseTruth):
+        known = truth.poses[given.stage.bone]
+        return [known.get(number) for number in frames.numbers], None
+    ok = {one.index for one in leading.followed.frames if one.is_ok}
+    believed = [pose if n in ok else None for n, pose in enumerate(leading.poses)]
+    vertices_mm = given.plan.bones[given.stage.bone].mesh.vertices_mm
+    solved = solve_frames(frames.times_ns, believed, truth, vertices_mm)
+    return find_poses(solved, truth, frames.times_ns), solved
+
+
+def _find_known(given: Study, true: Sequence[RigidTransform | None]) -> frozenset[int]:
+    if isinstance(given.truth, DivotTruth):
+        return frozenset(given.truth.numbers)
+    numbers = given.frames.numbers
+    return frozenset(number for number, pose in zip(numbers, true, strict=True) if pose)
+
+
+def _score(given: Study, answers: Answers, true: Sequence[RigidTransform | None]) -> Answers:
+    bone = given.plan.bones[given.stage.bone]
+    targets_mm = given.plan.targets_of(given.stage.targets)
+    geometry = rectifier_of(given.rig).geometry
+    touched_mm: Sequence[float | None] = [None] * len(true)
+    if isinstance(given.truth, DivotTruth):
+        touched_mm = measure_divots(answers.poses, given.frames.numbers, given.truth)
+    frames = []
+    for frame in answers.followed.frames:
+        pose, known = answers.poses[frame.index], true[frame.index]
+        tre_mm, displacement_mm, outline_mm = touched_mm[frame.index], None, None
+        if pose is not None and known is not None:
+            tre_mm, displacement_mm, outline_mm = measure_pose(
+                pose, known, bone, targets_mm, answers.surface, geometry
+            )
+        frames.append(
+            replace(frame, tre_mm=tre_mm, displacement_mm=displacement_mm, outline_mm=outline_mm)
+        )
+    return replace(answers, followed=replace(answers.followed, frames=tuple(frames)))
+
+
+def _number(answers: Answers, numbers: Sequence[int]) -> Answers:
+    """With the numbers of the pictures instead of their places."""
+    frames = tuple(replace(one, index=numbers[one.index]) for one in answers.followed.frames)
+    return replace(answers, followed=replace(answers.followed, frames=frames))
+
+
+def _draw_worst(
+    given: Study, answers: Answers, true: Sequence[RigidTransform | None]
+) -> Iterator[tuple[FrameScore, bytes]]:
+    """The largest errors that the judge calls OK; of all poses when it calls none so."""
+    known = [one for one in answers.followed.frames if one.tre_mm is not None]
+    chosen = [one for one in known if one.is_ok] or known
+    chosen.sort(key=lambda one: one.tre_mm or 0.0, reverse=True)
+    sequence = given.to_sequence(true)
+    for one in chosen[:_N_PICTURES]:
+        picture = draw_frame(sequence, answers, one.index)
+        if picture is not None:
+            yield replace(one, index=given.frames.numbers[one.index]), picture

@@ -1,0 +1,18 @@
+"""What is run for the paper's tables."""
+
+from dataclasses import replace
+
+from navapp.evaluation.paper.cases import FIRST_SEED, INSTRUMENT_S, SWEEP_FRAMES, Case, CaseTest
+from navapp.evaluation.paper.settings import TableSettings
+
+STILL, SWEPT = Case("man", "opening", "registration"), Case("man", "opening", "instrument")
+SETTINGS = TableSettings((STILL, SWEPT), ("bimcc",), 1, 40, FIRST_SEED)
+
+
+def test_an_instrument_passes_once_whatever_is_asked() -> None:
+    still, swept = SETTINGS.tests
+    assert (SETTINGS.count_frames(still), SETTINGS.count_frames(swept)) == (40, SWEEP_FRAMES)
+    assert replace(SETTINGS, n_frames=120).count_frames(swept) == 120
+    assert replace(SETTINGS, n_frames=5, is_quick=True).count_frames(swept) == 5
+    rate_hz = CaseTest(SWEPT, 0, 1).configure().camera.rate_hz
+    assert SWEEP_FRAMES / rate_hz > INSTRUMENT_S[1]
