@@ -1,15 +1,18 @@
 """What highlights do to the measurement of a glossy bone, and to the judge's word on it.
 
 usage: python -m tests.bench.bone_highlights [--knees N] [--first SEED] [--stage STAGE]
+                                              [--highlights X]
 
 First, at the true pose: residuals of matching over what they claim (spread, median absolute
-deviation), in grey pictures and in pictures without highlights, and where only one of them answers.
-Then knees that are registered and followed over four frames, with and without the second look. The
-seeds are those that the constants were chosen on.
+deviation), in grey pictures and in pictures without highlights, and where only one of them answers;
+how far both contradict each other, and how many pixels are answered. `--highlights 0` makes the
+bones matt. Then knees that are registered and followed over four frames, with and without the
+second look. The seeds are those that the constants were chosen on.
 """
 
 import argparse
 from collections.abc import Iterator
+from dataclasses import replace
 from unittest import mock
 
 import numpy as np
@@ -18,12 +21,12 @@ from numpy.typing import NDArray
 from navapp.control.stages import stage_by_name
 from navapp.evaluation.following import follow
 from navapp.evaluation.paper.cases import SAMPLES, Case, CaseTest
-from navapp.evaluation.sequence import KnownSequence
+from navapp.evaluation.sequence import KnownSequence, render_room
 from navapp.registration import RegistrationModel
 from navapp.stereo import refine_on_model
 from navapp.stereo.matte_pictures import make_matte_pair
 from navapp.tracking import TrackerSettings
-from navapp.tracking.search.highlights import HighlightSearch
+from navapp.tracking.search.highlights import HighlightSearch, measure_contradiction
 from navapp.tracking.surface_meter import NEAR_BOX, NEAR_VIEW, SurfaceMeter
 from navapp.values import DisparityMap
 
@@ -37,8 +40,9 @@ def main() -> None:
     parser.add_argument("--knees", type=int, default=6)
     parser.add_argument("--first", type=int, default=FIRST_SEED)
     parser.add_argument("--stage", default="patella")
+    parser.add_argument("--highlights", type=float, default=1.0, help="times the usual area")
     options = parser.parse_args()
-    sequences = list(_render(options.stage, options.first, options.knees))
+    sequences = list(_render(options))
     spreads = [measure_spreads(one) for one in sequences]
     print("| answered by | spread over the claim, by knee |\n|---|---|")
     for name in spreads[0]:
@@ -49,11 +53,16 @@ def main() -> None:
         print(_follow_all(sequences, is_on=is_on))
 
 
-def _render(stage: str, first: int, n_knees: int) -> Iterator[KnownSequence]:
+def _render(options: argparse.Namespace) -> Iterator[KnownSequence]:
     samples = tuple(SAMPLES)
-    for number in range(n_knees):
-        case = Case(samples[number % len(samples)], stage_by_name(stage).name, "overlay")
-        yield CaseTest(case, number, first + number).render(_FRAMES)
+    for number in range(options.knees):
+        case = Case(samples[number % len(samples)], options.stage, "overlay")
+        usual = CaseTest(case, number, options.first + number).configure()
+        simulated = usual.camera.simulated.model_copy(update={"highlights": options.highlights})
+        camera = usual.camera.model_copy(update={"simulated": simulated})
+        yield render_room(
+            usual.model_copy(update={"camera": camera}), stage_by_name(options.stage).name, _FRAMES
+        )
 
 
 def measure_spreads(sequence: KnownSequence) -> dict[str, float]:
@@ -69,9 +78,9 @@ def measure_spreads(sequence: KnownSequence) -> dict[str, float]:
     if expected is None:
         raise AssertionError("the bone is in view")
     support_px = expected.support_px
-    region = meter.find_region(pose, NEAR_VIEW)
-    coloured = meter.rectifier.rectify(frame.left, frame.right, *(region or (None, None)))
-    coloured = type(coloured)(coloured.left, coloured.right, coloured.geometry, expected.pair.box)
+    region = meter.find_region(pose, NEAR_VIEW) or (None, None)
+    coloured = meter.rectifier.rectify(frame.left, frame.right, *region)
+    coloured = replace(coloured, box=expected.pair.box)
     matte_pair = make_matte_pair(coloured, np.isfinite(support_px))
     if matte_pair is None:
         raise AssertionError("the simulator's pictures have colours")
@@ -83,6 +92,8 @@ def measure_spreads(sequence: KnownSequence) -> dict[str, float]:
         "without highlights": _spread(matte, support_px, has_matte),
         "grey alone": _spread(grey, support_px, has_grey & ~has_matte),
         "without highlights alone": _spread(matte, support_px, has_matte & ~has_grey),
+        "contradiction of both, over their claims": measure_contradiction(grey, matte),
+        "answered without highlights, over grey": matte.n_matched / grey.n_matched,
     }
 
 
