@@ -1,6 +1,6 @@
 """The application: polls the session, passes views to the screens, submits commands."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar
@@ -10,21 +10,7 @@ from textual.binding import BindingType
 from textual.screen import Screen
 
 from navapp.control.commands import (
-    CheckPicks,
-    Command,
-    ConfirmCondition,
-    ConfirmStep,
-    DropPoint,
-    EnterStage,
-    ForgetPoints,
-    OverrideGate,
     Quit,
-    Register,
-    SetProjector,
-    ToggleLayer,
-    TouchPoint,
-    WithdrawCondition,
-    WithdrawStep,
 )
 from navapp.control.states import (
     Event,
@@ -32,7 +18,6 @@ from navapp.control.states import (
     SessionState,
     Snapshot,
 )
-from navapp.geometry.box import Box
 from navapp.preop import PlanView
 from navapp.ui.actions import (
     ACTION_OF_KEY_EVERYWHERE,
@@ -42,26 +27,26 @@ from navapp.ui.actions import (
 )
 from navapp.ui.background import Background
 from navapp.ui.calibration_page import CalibrationPage
-from navapp.ui.gates_page import REASONS, GatesPage, condition_of_key
+from navapp.ui.gates_page import GatesPage
 from navapp.ui.help_page import HelpPage
 from navapp.ui.layers_page import LayersPage
 from navapp.ui.main_screen import MainScreen
-from navapp.ui.pages import DevicesPage, EventsPage, PowerQuestion, QuitQuestion
+from navapp.ui.page_commands import PageCommands
+from navapp.ui.pages import DevicesPage, EventsPage, QuitQuestion
 from navapp.ui.palette import ActionProvider
-from navapp.ui.picks_page import PicksChecked, PicksPage, Place
+from navapp.ui.picks_page import PicksPage, Place
 from navapp.ui.pictures.graphics import Graphics
 from navapp.ui.pictures.picture_view import PictureView
 from navapp.ui.plan_page import PlanPage
-from navapp.ui.quiet_app import QuietApp
 from navapp.ui.screens import ViewScreen
 from navapp.ui.session import Session
 from navapp.ui.settings_page import SettingsPage
 from navapp.ui.slice_walk import SliceWalk
-from navapp.ui.start_page import StartChosen, StartPage
-from navapp.ui.steps_page import StepsPage, step_of_key
+from navapp.ui.start_page import StartPage
+from navapp.ui.steps_page import StepsPage
 from navapp.ui.symbols import UNICODE, Symbols
 from navapp.ui.theme import NAVAPP_THEME
-from navapp.ui.tools_page import ToolsPage, landmark_of_key
+from navapp.ui.tools_page import ToolsPage
 from navapp.ui.view import View
 
 POLLS_PER_S = 10
@@ -87,7 +72,7 @@ _PAGES = {
 _BACKGROUND_PAGES = {"calibration": CalibrationPage, "settings": SettingsPage}
 
 
-class NavigationApp(QuietApp):
+class NavigationApp(PageCommands):
     """The operator's screen for one session.
 
     Args:
@@ -120,13 +105,16 @@ class NavigationApp(QuietApp):
         background: Background | None = None,
         plan: PlanView | None = None,
     ) -> None:
-        super().__init__()
+        snapshot = session.snapshot()
+        start_ns = min([snapshot.time_ns, *(event.time_ns for event in snapshot.events)])
+        has_colours = graphics is None or graphics.has_colours
+        view = View(snapshot, symbols, start_ns, title=title, has_colours=has_colours)
+        super().__init__(session, view)
         if graphics is not None:
             self.use_graphics(graphics)
         self.register_theme(NAVAPP_THEME)
         self.theme = NAVAPP_THEME.name
         self.title = title
-        self._session = session
         self._symbols = symbols
         self._polls_per_s = polls_per_s
         self._hints = tuple(hints)
@@ -134,17 +122,7 @@ class NavigationApp(QuietApp):
         self._walk = None if plan is None else SliceWalk(plan)
         self._n_polls = 0
         self._n_unchanged = 0
-        snapshot = session.snapshot()
-        start_ns = min([snapshot.time_ns, *(event.time_ns for event in snapshot.events)])
-        self._view = View(
-            snapshot,
-            symbols,
-            start_ns,
-            title=title,
-            has_colours=graphics is None or graphics.has_colours,
-        )
         self._known_events: frozenset[Event] = frozenset()
-        self._start_box: Box | None = None  # as it was drawn last
         self._picks: dict[str, Place] = {}  # as they were picked last
 
     def get_default_screen(self) -> Screen[None]:
@@ -232,96 +210,6 @@ class NavigationApp(QuietApp):
         picture.show(self._view)
         if self._view.is_near and self._view.snapshot.bone_box is None:
             self.notify("the region around the bone is shown when the bone is found")
-
-    def on_start_chosen(self, message: StartChosen) -> None:
-        """Search for the bone where an operator has drawn or picked it."""
-        if message.start.box is not None:
-            self._start_box = Box(*message.start.box)
-        if self._view.is_silent:
-            self._say_silent("register")
-        else:
-            self._session.submit(Register(message.start, message.bone))
-
-    def on_picks_checked(self, message: PicksChecked) -> None:
-        """Compare picked landmarks with the accepted registration."""
-        if self._view.is_silent:
-            self._say_silent("the check")
-        else:
-            self._session.submit(CheckPicks(message.picks))
-
-    def action_confirm_condition(self, key: str) -> None:
-        """Say that a condition is met: from the gates' page."""
-        self._say_of(condition_of_key(self._view.snapshot, key), ConfirmCondition)
-
-    def action_withdraw_condition(self, key: str) -> None:
-        """Say that it is not met after all."""
-        self._say_of(condition_of_key(self._view.snapshot, key), WithdrawCondition)
-
-    def action_pass_gate(self) -> None:
-        """Enter the stage whose gate the page shows."""
-        self._session.submit(EnterStage(self._view.snapshot.gate_stage))
-
-    def action_override_gate(self, number: str) -> None:
-        """Enter it whatever is open, with one of the page's reasons."""
-        reason = REASONS[int(number) - 1]
-        self._session.submit(OverrideGate(self._view.snapshot.gate_stage, reason))
-
-    def action_toggle_layer(self, name: str) -> None:
-        """Draw a layer, or no longer: from the page that lists them."""
-        self._session.submit(ToggleLayer(name))
-
-    def action_confirm_step(self, key: str) -> None:
-        """Say that a step has been made: from the steps' page."""
-        self._say_of(step_of_key(self._view.snapshot, key), ConfirmStep)
-
-    def action_withdraw_step(self, key: str) -> None:
-        """Say that a step has not been made after all."""
-        self._say_of(step_of_key(self._view.snapshot, key), WithdrawStep)
-
-    def action_touch_point(self, landmark: str) -> None:
-        """Take a point of the check on the patient: from the tools' page."""
-        if self._view.is_silent:
-            self._say_silent("a point")
-        else:
-            self._session.submit(TouchPoint(landmark))
-
-    def action_touch_landmark(self, key: str) -> None:
-        """Take a point on the landmark that a letter means."""
-        self._say_of(landmark_of_key(self._view.snapshot, key), TouchPoint)
-
-    def action_drop_point(self) -> None:
-        """Forget the point that was taken last."""
-        self._session.submit(DropPoint())
-
-    def action_forget_points(self) -> None:
-        """Begin the check anew."""
-        self._session.submit(ForgetPoints())
-
-    def action_set_projector(self, name: str) -> None:
-        """Tell the projector a setting: from the devices' page; asked before it goes off."""
-
-        def finish(is_sure: bool | None) -> None:
-            if is_sure:
-                self._say_of(name, SetProjector)
-
-        if name == "off":
-            self.push_screen(PowerQuestion(self._view), finish)
-        else:
-            finish(is_sure=True)
-
-    def _say_of(self, name: str | None, word: Callable[[str], Command]) -> None:
-        """A person's word for what a letter of a page means; nothing where it means nothing."""
-        if name is None:
-            return
-        if self._view.is_silent:
-            self._say_silent(name)
-        else:
-            self._session.submit(word(name))
-
-    def _say_silent(self, what: str) -> None:
-        """No key is dropped in silence."""
-        self.bell()
-        self.notify(f"{what} needs a session that answers", severity="warning")
 
     def _open_gates(self) -> None:
         """A gate was told as not met: its page, unless it is open."""
