@@ -107,6 +107,8 @@ class FirstRegistration:
         self, frame: Frame, answers: list[TrackedFrame], goal: Goal
     ) -> list[TrackedFrame]:
         """With what the best one is without highlights, where that is OK."""
+        if not answers:
+            return []
         best, *others = answers
         pose = best.left_from_bone
         # What speaks against the best of several poses is not taken back by a second look.

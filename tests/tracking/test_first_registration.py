@@ -8,6 +8,7 @@ import pytest
 from navapp.geometry.directions import ViewCone
 from navapp.preop import build_aspects
 from navapp.tracking.bimcc_tracker import BimccTracker
+from navapp.tracking.scoring import FitScorer
 from navapp.values import Prior, Status
 from tests.many import few_of
 from tests.tracking.rooms import GOAL, Room, cone, room
@@ -98,3 +99,10 @@ def test_a_box_beside_the_bone_gives_no_ok(box: tuple[int, int, int, int]) -> No
     found = tracker_with_aspects().register(frame.left, frame.right, prior, GOAL)
     assert found
     assert all(one.verdict.status is not Status.OK for one in found)
+
+
+def test_where_no_start_leads_to_a_pose_a_buried_bone_is_looked_for(monkeypatch) -> None:
+    monkeypatch.setattr(FitScorer, "find_poses", lambda *_: [])
+    a = room()
+    (found,) = a.tracker.register(a.frames[0].left, a.frames[0].right, a.prior, GOAL)
+    assert a.error_mm(found.left_from_bone, a.frames[0]) < 1.2
