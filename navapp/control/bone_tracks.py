@@ -175,7 +175,9 @@ class BoneTracks:
         if candidate.is_held:
             tracked = tracker.assess(left, right, track.left_from_bone, goal)
         else:
-            tracked, track = tracker.track(left, right, frame.captured_ns, track, goal)
+            tracked, track = tracker.track(
+                left, right, frame.captured_ns, track, goal, frame.skew_ns
+            )
         self._candidates[0] = replace(candidate, tracked=tracked, track=track)
         return tracked
 
@@ -183,7 +185,9 @@ class BoneTracks:
         """Follow the accepted bone into a frame."""
         tracker, goal = self._trackers.tracker(stage.bone), self._trackers.goal(stage)
         track = self._tracks[stage.bone]
-        tracked, track = tracker.track(frame.left, frame.right, frame.captured_ns, track, goal)
+        tracked, track = tracker.track(
+            frame.left, frame.right, frame.captured_ns, track, goal, frame.skew_ns
+        )
         self._tracks[stage.bone] = track
         return tracked
 
@@ -219,7 +223,9 @@ class BoneTracks:
         track = tracks[stage.bone]
         if moved is not None:
             track = track.carry(moved)
-        tracked, track = tracker.glance(frame.left, frame.right, frame.captured_ns, track, goal)
+        tracked, track = tracker.glance(
+            frame.left, frame.right, frame.captured_ns, track, goal, frame.skew_ns
+        )
         tracks[stage.bone] = track
         return tracked
 

@@ -12,7 +12,7 @@ from navapp.errors import RigError
 from navapp.geometry.bands import run_both
 from navapp.geometry.bilinear import Interpolation, bilinear, lens_maps
 from navapp.geometry.box import Box
-from navapp.geometry.resampling import TAPS_PX, find_places, resample
+from navapp.geometry.resampling import TAPS_PX, find_places, resample, shift_places
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform
 
@@ -158,6 +158,7 @@ class Rectifier:
         band_px: tuple[float, float] | None = None,
         *,
         is_grey: bool = False,
+        row_shifts_px: tuple[FloatArray, FloatArray] | None = None,
     ) -> RectifiedPair:
         """Rectify both pictures; `box` (in the rectified left view) is passed on clipped.
 
@@ -168,6 +169,8 @@ class Rectifier:
             band_px: smallest and largest disparity. With it only the box, and what it reaches in
                 the right picture, is rectified; the rest stays 0.
             is_grey: of coloured pictures only the luma.
+            row_shifts_px: (h, 2) each, of the left and of the right picture: x and y in it by which
+                each rectified row is looked up elsewhere. Not for bilinear interpolation.
 
         Raises:
             ValueError: pictures of another size than the rig's, a grey one beside a coloured one.
@@ -182,14 +185,19 @@ class Rectifier:
             greys = (luma(left), luma(right)) if is_grey else (left, right)
             return self._bilinear(greys, (in_left, in_right), inside)
         for_left, for_right = self._places
+        left_shift_px, right_shift_px = row_shifts_px or (None, None)
 
-        def rectify_one(picture: Image, places: "Places", part: Box) -> Image:
+        def rectify_one(
+            picture: Image, places: "Places", part: Box, shift_px: FloatArray | None
+        ) -> Image:
+            if shift_px is not None:
+                places = shift_places(places, shift_px, part)
             grey = _luma_for(picture, places, part) if is_grey else picture
             return resample(grey, places, part)
 
         pictures = run_both(
-            lambda: rectify_one(left, for_left, in_left),
-            lambda: rectify_one(right, for_right, in_right),
+            lambda: rectify_one(left, for_left, in_left, left_shift_px),
+            lambda: rectify_one(right, for_right, in_right, right_shift_px),
         )
         return RectifiedPair(*pictures, self.geometry, inside)
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from navapp.geometry.bands import in_row_bands
 from navapp.geometry.box import Box
+from navapp.geometry.transform import FloatArray
 
 if TYPE_CHECKING:
     # Kernels are loaded at first use: the command line starts without a compiler.
@@ -31,11 +32,47 @@ def find_places(columns: NDArray[np.float32], rows: NDArray[np.float32]) -> "Pla
     for y, found in enumerate(_extend(rows)):
         crossings[y] = np.interp(at, reached[y], found)
     is_inside = (rows >= 0.0).all(axis=1) & (rows <= height - 1.0).all(axis=1)
-    steps = _lane_blocks(np.floor(columns) - at.astype(np.float32))
-    lines = _lane_blocks(np.floor(crossings))
-    in_step = ((steps == steps[..., :1]) | (steps == steps[..., -1:])).all(axis=2)
-    in_row = (lines == lines[..., :1]).all(axis=2)
+    in_step = _are_in_step(np.floor(columns) - at.astype(np.float32))
+    in_row = _are_in_row(np.floor(crossings))
     return Places(np.ascontiguousarray(columns), crossings, in_step, in_row, is_inside)
+
+
+def shift_places(places: "Places", row_shift_px: FloatArray, part: Box) -> "Places":
+    """The places of a part's rows, moved by (h, 2) x and y in the picture; other rows stay empty.
+
+    The curve along which a row is looked for is taken as straight over the shift.
+    """
+    from navapp.geometry.resample_kernels import Places
+
+    band = part.clip(places.columns.shape[1], len(places.columns)).slices[0]
+    at = np.arange(places.columns.shape[1], dtype=np.float32)
+    x, y = np.float32(row_shift_px[band, 0:1]), np.float32(row_shift_px[band, 1:2])
+    curves = places.rows[band]
+    slope = (curves[:, -1:] - curves[:, :1]) / np.float32(max(curves.shape[1] - 1, 1))
+    columns, rows = np.empty_like(places.columns), np.empty_like(places.rows)
+    columns[band], rows[band] = places.columns[band] + x, curves + (y - slope * x)
+    in_step, in_row = np.zeros_like(places.in_step), np.zeros_like(places.in_row)
+    in_step[band] = _are_in_step(np.floor(columns[band]) - at)
+    in_row[band] = _are_in_row(np.floor(rows[band]))
+    # Not known any more: every pixel is asked.
+    is_inside = np.zeros_like(places.is_inside)
+    return Places(columns, rows, in_step, in_row, is_inside)
+
+
+def _are_in_step(steps: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """(h, blocks) of whole columns less their own place (h, w): but for one jump at most."""
+    blocks = _lane_blocks(steps)
+    is_in_step: NDArray[np.bool_] = (
+        (blocks == blocks[..., :1]) | (blocks == blocks[..., -1:])
+    ).all(axis=2)
+    return is_in_step
+
+
+def _are_in_row(lines: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """(h, blocks) of whole rows (h, w): all the same."""
+    blocks = _lane_blocks(lines)
+    is_in_row: NDArray[np.bool_] = (blocks == blocks[..., :1]).all(axis=2)
+    return is_in_row
 
 
 def _extend(lines: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -78,6 +78,7 @@ class Evidence:
     seen_error_mm: float = math.nan  # bound of the error by what is seen
     plan_mm: float = math.nan  # bound of the error by the plan: its cartilage and surface
     bound_mm: float | None = None  # bound of the error by all that is known; None without a pose
+    motion_mm: float = math.nan  # that motion between rows and eyes may cost
     cartilage_sd_mm: float = math.nan  # rms over the seen surface
     jump_mm: float = math.nan  # of the bone's centre from where it was expected
     jump_deg: float = math.nan  # turn from how it was expected
@@ -202,6 +203,8 @@ RULES = (
          lambda e: e.size_excess_mm, 0, None, CHOSEN),
     Rule(Reason.POSE_UNCERTAIN, "95 % bound by what is seen, over 0.5 mm and the plan's, mm",
          lambda e: e.seen_excess_mm, 0, None, CHOSEN),
+    Rule(Reason.MOVED_UNEVENLY, "what motion between rows and eyes may cost, mm",
+         lambda e: e.motion_mm, OK_ERROR_MM, None, CHOSEN),
     Rule(Reason.CARTILAGE_UNCERTAIN, "rms deviation of the cartilage, mm",
          lambda e: e.cartilage_sd_mm, 0.45, None,
          "chosen; compared in tests.bench.cartilage"),

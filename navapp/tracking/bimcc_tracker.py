@@ -17,6 +17,7 @@ from navapp.tracking.first_registration import FirstRegistration
 from navapp.tracking.frame import Fit, Frame, ignore
 from navapp.tracking.judging import PoseJudge
 from navapp.tracking.motion import TrackState, is_worth_a_search
+from navapp.tracking.row_times import RowTimes
 from navapp.tracking.search.after_loss import SearchAfterLoss
 from navapp.tracking.search.buried import BuriedSearch
 from navapp.tracking.search.highlights import HighlightSearch
@@ -61,42 +62,61 @@ class BimccTracker(Tracker):
         self.whole_view = WholeViewSearch(meter, aspects)
 
     def track(
-        self, left: Image, right: Image, captured_ns: int, state: TrackState, goal: Goal
+        self,
+        left: Image,
+        right: Image,
+        captured_ns: int,
+        state: TrackState,
+        goal: Goal,
+        skew_ns: int = 0,
     ) -> tuple[TrackedFrame, TrackState]:
         """Follow the bone into the next frame (the paper's section 3.2, intra-operative)."""
         watch = Stopwatch()
         # Predict where the bone will be.
         left_from_bone = state.predict(captured_ns, self.centre_mm)
+        times = RowTimes.of_pair(self.meter, state, captured_ns, skew_ns)
         best = None
         if state.n_lost == 0:
             # Rectify its box and depth band; the model's projection is the box of section 3.2.1.
-            frame = self.begin(left, right, left_from_bone, watch, NEAR_VIEW)
-            with self.begin_checks(frame) as checks:
-                # Measure on the model (section 3.2.2, algorithm 2) and fit (equations 4 to 9), in
-                # turns; check beside the fit; judge.
-                frame = replace(frame, on_measured=checks.check)
-                fits = self.near.find(frame)
-                best = self.judge_fits(frame, fits, goal, frame.start, checks=checks)
-                best = self.look_again(frame, best, goal, frame.start, checks)
-                if is_place_doubted(best.verdict):
-                    may_search_long = state.is_search_due and is_worth_a_search(best)
-                    frame = replace(frame, may_search_long=may_search_long)
-                    more = self.buried.find(frame)
-                    best = self.judge_fits(
-                        frame, more, goal, frame.start, best, checks, keeps_first=True
-                    )
+            frame = self.begin(left, right, left_from_bone, watch, NEAR_VIEW, times)
+            best = self._follow(frame, state, goal, frame.start)
+            # Once more where the rows of the pictures were exposed during another motion.
+            pose = best.left_from_bone
+            if times is not None and pose is not None:
+                times = times.correct(self.rectify_pose(pose)) or times
+                if times is not frame.times:
+                    again = self.begin(left, right, pose, watch, NEAR_VIEW, times)
+                    best = self._follow(again, state, goal, frame.start)
         if best is None or best.verdict.status is Status.LOST:
             state = replace(state, box=self.boxes.follow(state.box, left))
             # Search where the box lies, and where the bone was expected.
             best = self.search_places(
                 left, right, self.boxes.starts(left_from_bone, state.box), self.after_loss.find,
                 goal, self.rectify_pose(left_from_bone),
-                best or self.judge.lost(Reason.BONE_LOST, watch), watch, state.n_lost,
+                best or self.judge.lost(Reason.BONE_LOST, watch), watch, state.n_lost, times,
             )  # fmt: skip
         if best.verdict.status is not Status.OK:
             best = best.with_cause(self.find_cause(left, right, left_from_bone, state, best))
         # Update the motion, and the box.
         return self.update(best, state, left, captured_ns, watch)
+
+    def _follow(
+        self, frame: Frame, state: TrackState, goal: Goal, predicted: RigidTransform
+    ) -> TrackedFrame:
+        """The bone near the start of a frame; `predicted` as of `judge_fits`."""
+        with self.begin_checks(frame) as checks:
+            # Measure on the model (section 3.2.2, algorithm 2) and fit (equations 4 to 9), in
+            # turns; check beside the fit; judge.
+            frame = replace(frame, on_measured=checks.check)
+            fits = self.near.find(frame)
+            best = self.judge_fits(frame, fits, goal, predicted, checks=checks)
+            best = self.look_again(frame, best, goal, predicted, checks)
+            if is_place_doubted(best.verdict):
+                may_search_long = state.is_search_due and is_worth_a_search(best)
+                frame = replace(frame, may_search_long=may_search_long)
+                more = self.buried.find(frame)
+                best = self.judge_fits(frame, more, goal, predicted, best, checks, keeps_first=True)
+        return best
 
     def look_again(
         self,

@@ -9,6 +9,7 @@ from navapp.geometry.transform import RigidTransform
 from navapp.registration import BimccSettings
 from navapp.registration.step_kernels import noise_under_kernel_mm2
 from navapp.stereo import NearerSearch
+from navapp.tracking.row_times import RowTimes
 from navapp.tracking.surface_meter import FREE_CORRELATION_PX, MODEL_CORRELATION_PX, Measurement
 from navapp.values import PoseEstimate, Reason, Stopwatch
 
@@ -41,6 +42,8 @@ class Frame:
     # the same pictures in their colours, a box of them as far as a band of disparities reaches;
     # None of grey ones.
     rectify_coloured: RectifyBox | None = None
+    # when the rows of the pictures see a moving bone; None where they see it all at once.
+    times: RowTimes | None = None
     n_lost: int = 0  # frames lost before this one; in odd ones a search goes further off
     may_search_long: bool = True  # a search that takes as long as many frames is worth it
     # told what is measured on all of the model near `start`, and at which pose.

@@ -19,6 +19,7 @@ from navapp.tracking.contour import ContourRefiner
 from navapp.tracking.frame import Fit, Frame, ignore
 from navapp.tracking.motion import TrackState
 from navapp.tracking.outline import OutlineMeter
+from navapp.tracking.row_times import RowTimes
 from navapp.tracking.surface_meter import (
     NEAR_BOX,
     NEAR_VIEW,
@@ -63,7 +64,13 @@ class IcpTracker(Tracker):
         self._contour = ContourRefiner(self.model, outline)
 
     def track(
-        self, left: Image, right: Image, captured_ns: int, state: TrackState, goal: Goal
+        self,
+        left: Image,
+        right: Image,
+        captured_ns: int,
+        state: TrackState,
+        goal: Goal,
+        skew_ns: int = 0,
     ) -> tuple[TrackedFrame, TrackState]:
         """Follow the bone's box into the next frame, and fit in it (section 3.1)."""
         watch = Stopwatch()
@@ -72,7 +79,9 @@ class IcpTracker(Tracker):
         # The box comes from the pictures, and the start from the box.
         box = self.boxes.follow(state.box, left, state.left_from_bone)
         expected = self.boxes.starts(left_from_bone, box)[0]
-        frame = self.begin(left, right, expected, watch, NEAR_VIEW if is_near else WIDE_VIEW)
+        times = RowTimes.of_pair(self.meter, state, captured_ns, skew_ns)
+        margins = NEAR_VIEW if is_near else WIDE_VIEW
+        frame = self.begin(left, right, expected, watch, margins, times)
         predicted = self.rectify_pose(left_from_bone)
         with self.begin_checks(frame) if is_near else nullcontext() as checks:
             fits = [self.find_fit(frame, NEAR_BOX if is_near else WIDE_BOX)]

@@ -24,6 +24,7 @@ from navapp.tracking.following import RestSettings
 from navapp.tracking.foreground import find_foreground
 from navapp.tracking.frame import NOISE_VARIANCE_RATIO, Fit, Frame
 from navapp.tracking.outline import OutlineMeter
+from navapp.tracking.row_times import RowTimes
 from navapp.tracking.surface_meter import SurfaceMeter
 from navapp.values import (
     Foreground,
@@ -91,10 +92,10 @@ class PoseJudge:
         depth_mm = float(fit.pose.apply(model.centre_mm)[2])
         fit, view, agreement = self._settle(frame, fit, check)
         evidence = self._evidence_of_pair(check.health, depth_mm)
-        evidence = self._evidence_of_pose(evidence, fit, agreement, goal, predicted)
+        evidence = self._evidence_of_pose(evidence, fit, agreement, goal, predicted, frame.times)
         verdict = decide(evidence)
         is_told = verdict.predicted_tre_mm is not None or self._tells_refused
-        estimate = self._unrectify(fit.estimate) if is_told else None
+        estimate = self._unrectify(_at_seen_rows(frame, fit)) if is_told else None
         rows = _check_rows(check.health, evidence, verdict)
         frame.watch.lap("judge")
         foreground = None
@@ -179,6 +180,7 @@ class PoseJudge:
         agreement: Agreement | None,
         goal: Goal,
         predicted: RigidTransform | None,
+        times: RowTimes | None,
     ) -> Evidence:
         """With what a fit and its agreement with the measurement say."""
         model, estimate = self._meter.model, fit.estimate
@@ -193,7 +195,8 @@ class PoseJudge:
         cartilage_sd_mm = float(np.sqrt(np.mean(seen_sd_mm**2))) if len(seen_sd_mm) else 0.0
         plan_mm = _COMMON_ERROR_SIGMAS * math.hypot(cartilage_sd_mm, model.bone.surface_sd_mm)
         seen_error_mm = self._bound_mm(estimate, goal.targets_mm, is_seen)
-        bound_mm = math.hypot(seen_error_mm, plan_mm, self._error_of_rig_mm(estimate))
+        motion_mm = 0.0 if times is None else times.error_mm(estimate.camera_from_bone)
+        bound_mm = math.hypot(seen_error_mm, plan_mm, self._error_of_rig_mm(estimate), motion_mm)
         # Errors of a cartilage's thickness that go together look like another size.
         size_sigma_mm = math.hypot(estimate.size_sigma_mm, plan_mm)
         twist = np.zeros(6)
@@ -209,6 +212,7 @@ class PoseJudge:
             seen_error_mm=seen_error_mm,
             plan_mm=plan_mm,
             bound_mm=math.hypot(bound_mm, known.row_error_mm),
+            motion_mm=motion_mm,
             cartilage_sd_mm=cartilage_sd_mm,
             jump_mm=float(np.linalg.norm(twist[:3])),
             jump_deg=math.degrees(np.linalg.norm(twist[3:])),
@@ -250,3 +254,11 @@ def _check_rows(health: StereoHealth, evidence: Evidence, verdict: Verdict) -> R
     light = (Reason.PICTURE_DARK, Reason.PICTURE_OVEREXPOSED, Reason.PICTURES_UNLIKE)
     is_poor = math.isnan(health.row_offset_px) or not set(light).isdisjoint(verdict.reasons)
     return None if is_poor else RowCheck(health.row_offset_px, evidence.row_error_mm > OK_ERROR_MM)
+
+
+def _at_seen_rows(frame: Frame, fit: Fit) -> PoseEstimate:
+    """The estimate at the time at which what is seen of the bone was exposed."""
+    if frame.times is None:
+        return fit.estimate
+    pose = frame.times.move_to_seen(fit.pose, fit.measured.disparity)
+    return replace(fit.estimate, camera_from_bone=pose)

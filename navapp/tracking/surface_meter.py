@@ -15,7 +15,7 @@ from navapp.geometry.masks import large_regions
 from navapp.geometry.rectification import Image, RectifiedPair, rectifier_of
 from navapp.geometry.reduced_rectification import ReducedRectifier
 from navapp.geometry.rig import StereoRig
-from navapp.geometry.transform import RigidTransform
+from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer import RenderedView, bounds_of
 from navapp.registration import RegistrationModel, Scene
 from navapp.stereo import (
@@ -116,11 +116,21 @@ class SurfaceMeter:
         self._bounds = lru_cache(_KEPT_BOUNDS)(bounds)
 
     def rectify(
-        self, left: Image, right: Image, around: RigidTransform, margins: Margins
+        self,
+        left: Image,
+        right: Image,
+        around: RigidTransform,
+        margins: Margins,
+        row_shifts_px: tuple[FloatArray, FloatArray] | None = None,
     ) -> RectifiedPair:
-        """Both pictures, grey and rectified, as far around an expected pose as is asked for."""
+        """Both pictures, grey and rectified, as far around an expected pose as is asked for.
+
+        Their rows are shifted as `Rectifier.rectify` says.
+        """
         box, band_px = self.find_region(around, margins) or (None, None)
-        return self.rectifier.rectify(left, right, box, band_px, is_grey=True)
+        return self.rectifier.rectify(
+            left, right, box, band_px, is_grey=True, row_shifts_px=row_shifts_px
+        )
 
     def make_nearer_search(self, left: Image, right: Image) -> NearerSearch:
         """How to look for what stands before the depths that were rectified, up to the nearest."""

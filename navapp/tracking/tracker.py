@@ -20,6 +20,7 @@ from navapp.tracking.diagnosis import Diagnosis
 from navapp.tracking.frame import FREE_SETTINGS, Fit, Frame, RectifyBox, ignore
 from navapp.tracking.judging import PoseJudge
 from navapp.tracking.motion import TrackState
+from navapp.tracking.row_times import RowTimes
 from navapp.tracking.scoring import FitScorer
 from navapp.tracking.surface_meter import NEAR_BOX, NEAR_VIEW, WIDE_VIEW, Margins, SurfaceMeter
 from navapp.values import BoneModel, Prior, Reason, Status, Stopwatch, TrackedFrame, Verdict
@@ -104,16 +105,31 @@ class Tracker(ABC):
 
     @abstractmethod
     def track(
-        self, left: Image, right: Image, captured_ns: int, state: TrackState, goal: Goal
+        self,
+        left: Image,
+        right: Image,
+        captured_ns: int,
+        state: TrackState,
+        goal: Goal,
+        skew_ns: int = 0,
     ) -> tuple[TrackedFrame, TrackState]:
-        """Follow the bone into the next frame, and search for it when it is lost."""
+        """Follow the bone into the next frame, and search for it when it is lost.
+
+        The right picture is exposed later than the left one by `skew_ns`.
+        """
 
     @abstractmethod
     def find_for_glance(self, frame: Frame) -> Iterable[Fit | None]:
         """The fits that are soon found near the start of a frame."""
 
     def glance(
-        self, left: Image, right: Image, captured_ns: int, state: TrackState, goal: Goal
+        self,
+        left: Image,
+        right: Image,
+        captured_ns: int,
+        state: TrackState,
+        goal: Goal,
+        skew_ns: int = 0,
     ) -> tuple[TrackedFrame, TrackState]:
         """Follow the bone into the next frame without any search, lost or not.
 
@@ -121,7 +137,8 @@ class Tracker(ABC):
         """
         watch = Stopwatch()
         left_from_bone = state.predict(captured_ns, self.centre_mm)
-        frame = self.begin(left, right, left_from_bone, watch, NEAR_VIEW)
+        times = RowTimes.of_pair(self.meter, state, captured_ns, skew_ns)
+        frame = self.begin(left, right, left_from_bone, watch, NEAR_VIEW, times)
         with self.begin_checks(frame) as checks:
             fits = self.find_for_glance(frame)
             best = self.judge_fits(
@@ -160,17 +177,24 @@ class Tracker(ABC):
         left_from_bone: RigidTransform,
         watch: Stopwatch,
         margins: Margins = WIDE_VIEW,
+        times: RowTimes | None = None,
     ) -> Frame:
-        """Both pictures, rectified around an expected bone."""
+        """Both pictures, rectified around an expected bone, as at one time if `times` are given."""
         start = self.rectify_pose(left_from_bone)
-        pair = self.meter.rectify(left, right, start, margins)
+        shifts_px = None if times is None else times.find_shifts(start)
+        pair = self.meter.rectify(left, right, start, margins, shifts_px)
         watch.lap("rectify")
         nearer = self.meter.make_nearer_search(left, right)
-        return Frame(pair, start, watch, nearer, self.colours_of(left, right))
+        coloured = self.colours_of(left, right, shifts_px)
+        return Frame(pair, start, watch, nearer, coloured, times)
 
-    def colours_of(self, left: Image, right: Image) -> RectifyBox | None:
+    def colours_of(
+        self, left: Image, right: Image, shifts_px: tuple[FloatArray, FloatArray] | None = None
+    ) -> RectifyBox | None:
         """How boxes of two pictures are rectified in their colours; None of grey ones."""
-        return partial(self.meter.rectifier.rectify, left, right) if left.ndim == 3 else None
+        if left.ndim == 2:
+            return None
+        return partial(self.meter.rectifier.rectify, left, right, row_shifts_px=shifts_px)
 
     def begin_checks(self, frame: Frame) -> PairChecks:
         """Checks of a frame in which the bone is expected near the start, begun at once."""
@@ -223,13 +247,14 @@ class Tracker(ABC):
         best: TrackedFrame,
         watch: Stopwatch,
         n_lost: int = 0,
+        times: RowTimes | None = None,
     ) -> TrackedFrame:
         """The best of an answer and of searches around places (left camera from bone), until an OK.
 
         Only around the first place a search goes further off, as `n_lost` asks for.
         """
         for number, place in enumerate(places):
-            frame = self.begin(left, right, place, watch)
+            frame = self.begin(left, right, place, watch, times=times)
             frame = replace(frame, n_lost=0 if number else n_lost)
             best = self.judge_fits(frame, find(frame), goal, predicted, best)
             if best.verdict.status is Status.OK:

@@ -139,11 +139,11 @@ class FakeTracker:
             raise self.script.error
         return list(self.script.found)
 
-    def track(self, left, right, captured_ns, state: TrackState, goal):
+    def track(self, left, right, captured_ns, state: TrackState, goal, skew_ns=0):
         self.script.calls.append(f"track {self.bone.name}")
         return self._follow(captured_ns, state, goal)
 
-    def glance(self, left, right, captured_ns, state: TrackState, goal):
+    def glance(self, left, right, captured_ns, state: TrackState, goal, skew_ns=0):
         self.script.calls.append(f"glance at {self.bone.name}")
         return self._follow(captured_ns, state, goal)
 

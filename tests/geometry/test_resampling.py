@@ -5,7 +5,7 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from navapp.geometry.box import Box
-from navapp.geometry.resampling import find_places, resample
+from navapp.geometry.resampling import find_places, resample, shift_places
 from tests.reference.resample_reference import resample_slowly
 
 
@@ -69,3 +69,21 @@ def test_the_kernel_agrees_with_the_readable_reference(turn: float, scale: float
     cut = resample(picture, find_places(columns, rows), part)
     np.testing.assert_array_equal(cut[rows_of, columns_of], found[rows_of, columns_of])
     assert np.count_nonzero(cut) == np.count_nonzero(cut[rows_of, columns_of])
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.03])
+def test_shifted_rows_are_those_of_shifted_places(turn: float) -> None:
+    rng = np.random.default_rng(4)
+    picture = np.clip(128 + 300 * gaussian_filter(rng.normal(size=(44, 67)), 2.0), 0, 255)
+    picture = picture.astype(np.uint8)
+    columns, rows = bent(44, 67, turn, 1.0)
+    shift_px = np.column_stack([np.linspace(-1.4, 0.9, 44), np.linspace(0.7, -0.4, 44)])
+    part = Box(12, 9, 40, 25)
+    moved = shift_places(find_places(columns, rows), shift_px, part)
+    found = resample(picture, moved, part)
+    expected = resample_slowly(
+        picture, np.float32(columns + shift_px[:, :1]), np.float32(rows + shift_px[:, 1:])
+    )
+    apart = np.abs(found.astype(int) - expected)[part.slices]
+    assert apart.max() <= 2
+    assert (apart == 0).mean() > 0.9

@@ -103,6 +103,7 @@ ROWS = (
     Row(Reason.SIZE_DIFFERS, lambda x: known(extent_mm=x), None, 5.0, -1e-6),
     Row(Reason.SIZE_DIFFERS, lambda x: known(size_excess_mm=x), 0, None),
     Row(Reason.POSE_UNCERTAIN, lambda x: known(seen_error_mm=x + 0.5), 0, None),
+    Row(Reason.MOVED_UNEVENLY, lambda x: known(motion_mm=x), 0.5, None),
     Row(Reason.CARTILAGE_UNCERTAIN, lambda x: known(cartilage_sd_mm=x), 0.45, None),
     Row(Reason.TRE_TOO_LARGE, lambda x: known(bound_mm=x + 2.0), 0, None),
     Row(Reason.JUMPED, lambda x: known(jump_mm=x), 12.0, None),
