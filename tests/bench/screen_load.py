@@ -66,6 +66,7 @@ class PlayedCamera:
             self._due_s += 1.0 / _RATE_HZ
             next(self._frames)
         time.sleep(max(0.0, self._due_s - time.monotonic()))
+        self._due_s += 1.0 / _RATE_HZ
         now_ns = time.monotonic_ns()
         self._n += 1
         return replace(next(self._frames), captured_ns=now_ns, received_ns=now_ns, sequence=self._n)
