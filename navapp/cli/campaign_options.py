@@ -56,6 +56,11 @@ def read_counts(
     return Counts(tests, frames, seed)
 
 
+def is_chosen(name: str, chosen: list[str] | None) -> bool:
+    """Whether an option names it; all are chosen where the option is left out."""
+    return chosen is None or name in chosen
+
+
 def run_and_write(
     settings: "Campaign[Any]",
     write: "Callable[[CampaignFolder[Any]], dict[str, Any]]",

@@ -3,7 +3,7 @@
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from navapp.cli.campaign_options import Counts, read_counts, run_and_write
+from navapp.cli.campaign_options import Counts, is_chosen, read_counts, run_and_write
 from navapp.cli.diagnostics import Diagnostics
 from navapp.cli.evaluate_recording import add_options, check_no_recording, run_recording
 from navapp.cli.evaluate_stress import add_stress_options, check_no_stress, run_stress
@@ -43,9 +43,7 @@ def add_parser(subparsers: Any) -> None:
         ("--methods", "methods", ("icp", "paper", "bimcc")),
     )
     for option, what, names in chosen:
-        parser.add_argument(
-            option, nargs="+", choices=names, default=list(names), help=f"{what} (all)"
-        )
+        parser.add_argument(option, nargs="+", choices=names, help=f"{what} (all)")
     parser.add_argument("--tests", type=int, metavar="N", help=f"of each case ({_TESTS})")
     parser.add_argument(
         "--frames",
@@ -90,32 +88,26 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
 
 
 def _run_stress(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
-    from navapp.evaluation.paper.cases import METHODS, SAMPLES, SITUATIONS, STAGE_NAMES
-
-    usual = {
-        "samples": list(SAMPLES), "stages": list(STAGE_NAMES), "situations": list(SITUATIONS),
-        "methods": list(METHODS),
-    }  # fmt: skip
-    for name, value in usual.items():
-        if getattr(options, name) != value:
+    for name in ("samples", "stages", "situations", "methods"):
+        if getattr(options, name) is not None:
             raise UsageError(f"--{name} is of the tables", remedy="leave it out, or --stress")
     return run_stress(options, diagnostics)
 
 
 def _run_recording(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
-    from navapp.evaluation.paper.cases import METHODS, SAMPLES, SITUATIONS, STAGE_NAMES
+    from navapp.evaluation.paper.cases import METHODS
 
-    usual = {
-        "samples": list(SAMPLES), "stages": list(STAGE_NAMES), "situations": list(SITUATIONS),
-        "tests": None, "frames": None, "seed": None, "quick": False, "processes": None,
-        "stress": False, "axes": None,
-    }  # fmt: skip
-    for name, value in usual.items():
-        if getattr(options, name) != value:
+    of_knees = (
+        "samples", "stages", "situations", "tests", "frames", "seed", "quick", "processes",
+        "stress", "axes",
+    )  # fmt: skip
+    for name in of_knees:
+        # A seed of 0 is given as well.
+        if not any(getattr(options, name) is unset for unset in (None, False)):
             raise UsageError(
                 f"--{name} is of simulated knees", remedy="leave it out, or --recording"
             )
-    methods = [name for name in METHODS if name in options.methods]
+    methods = [name for name in METHODS if is_chosen(name, options.methods)]
     return run_recording(options, methods, diagnostics)
 
 
@@ -128,11 +120,11 @@ def _read_settings(options: argparse.Namespace) -> "TableSettings":
     cases = tuple(
         case
         for case in ALL_CASES
-        if case.sample in options.samples
-        and case.stage in options.stages
-        and case.situation in options.situations
+        if is_chosen(case.sample, options.samples)
+        and is_chosen(case.stage, options.stages)
+        and is_chosen(case.situation, options.situations)
     )
-    methods = tuple(name for name in METHODS if name in options.methods)
+    methods = tuple(name for name in METHODS if is_chosen(name, options.methods))
     return TableSettings(
         cases, methods, counts.tests, counts.frames, counts.first_seed, options.quick
     )
