@@ -20,3 +20,10 @@ def test_a_bench_imports(name: str) -> None:
         if error.name not in PEERS:
             raise
         pytest.skip(f"{error.name} is a peer")
+
+
+def test_the_bench_of_faces_counts_them(capsys, monkeypatch) -> None:
+    """Its scene stands for the simulator's: whoever changes how those are rendered is told here."""
+    monkeypatch.setattr("sys.argv", ["tool_faces", "--frames", "2"])
+    assert importlib.import_module("tests.bench.tool_faces").main() == 0
+    assert capsys.readouterr().out

@@ -13,6 +13,7 @@ import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -21,7 +22,6 @@ from navapp.geometry.mesh import TriangleMesh
 from navapp.tracking import TrackState, make_tracker
 from navapp.values import BoneModel, Prior, Status, TrackedFrame
 from sim_devices.anatomy import KneeSpec, make_knee
-from sim_devices.rigs import NO_TURN, Turn
 from sim_devices.scenario import Scenario
 from sim_devices.sensor import SensorModel
 from sim_devices.world import World
@@ -63,13 +63,11 @@ class Loop:
         number = round(time_ns * 1e-9 * _RATE_HZ) % (2 * _RENDERED - 2)
         return round(min(number, 2 * _RENDERED - 2 - number) * 1e9 / _RATE_HZ)
 
-    def render(
-        self, eye: str, time_ns: int, scale: float = 1.0, turn_rad: Turn = NO_TURN
-    ) -> np.ndarray:
+    def render(self, eye: str, time_ns: int, *how: Any) -> np.ndarray:
         """As the world's."""
         key = (eye, self.world_ns(time_ns))
         if key not in self._rendered:
-            self._rendered[key] = self.world.render(eye, key[1], scale, turn_rad)
+            self._rendered[key] = self.world.render(eye, key[1], *how)
         return self._rendered[key]
 
 

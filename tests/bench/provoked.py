@@ -4,6 +4,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import lru_cache
+from typing import Any
 
 import cv2
 import numpy as np
@@ -13,7 +14,6 @@ from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.tracking import Goal, Tracker, TrackState
 from navapp.values import BoneModel, Prior, Status, TrackedFrame
 from sim_devices.motion import LegMotion, smooth_step
-from sim_devices.rigs import NO_TURN, Turn
 from sim_devices.scenario import Scenario
 from sim_devices.sensor import Eye, SensorModel
 from sim_devices.world import World
@@ -117,12 +117,10 @@ class Theatre:
         """Of the femur."""
         return self.world.left_from_body("femur", time_ns)
 
-    def render(
-        self, eye: Eye, time_ns: int, scale: float = 1.0, turn_rad: Turn = NO_TURN
-    ) -> np.ndarray:
+    def render(self, eye: Eye, time_ns: int, *how: Any) -> np.ndarray:
         """As the world's, disturbed while the event lasts."""
         event, time_s = self.event, time_ns / 1e9
-        radiance = self.world.render(eye, time_ns, scale, turn_rad)
+        radiance = self.world.render(eye, time_ns, *how)
         if not event.is_on(time_s):
             return radiance
         if event.covered_share:

@@ -12,6 +12,7 @@ import argparse
 import sys
 from collections import Counter
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from navapp.geometry.transform import RigidTransform, rotation_angle_deg, rotati
 from navapp.tools.plate import Plate
 from navapp.tools.plate_meter import PlateMeter, PlatePose
 from sim_devices.held_tool import Cover, ToolInView
-from sim_devices.rigs import NO_TURN, Turn, make_default_rig
+from sim_devices.rigs import make_default_rig
 from sim_devices.sensor import SensorModel
 
 # Not the seed of any test or other bench.
@@ -40,9 +41,7 @@ class _Cluttered:
         picture = np.kron(coarse, np.ones((120, 128), np.float32))[:720, :1280]
         self._picture = np.repeat(picture[:, :, None], 3, axis=2)
 
-    def render(
-        self, eye: str, time_ns: int, scale: float = 1.0, turn_rad: Turn = NO_TURN
-    ) -> np.ndarray:
+    def render(self, eye: str, time_ns: int, *how: Any) -> np.ndarray:
         """(H, W, 3)."""
         return self._picture
 
