@@ -161,10 +161,16 @@ _NUMBERS = {
 }
 
 
+# A principal point that is wrong along the rows shifts every disparity as a sideways turn does, and
+# a focal length scales depth as the baseline does: no picture of one bone tells them from those.
+_NOT_SEEN = ("fx", "cx")
+
+
 def _camera_axes() -> tuple[Axis, ...]:
     return tuple(
         Axis(f"{eye}-{number}", f"{number} of the {eye} camera", unit, levels, 0.0,
-             rig=changes.change_camera(eye, number), found_by=_BOARD)
+             rig=changes.change_camera(eye, number), found_by=_BOARD,
+             hidden_up_to=math.inf if number in _NOT_SEEN else 0.0)
         for number, (unit, levels) in _NUMBERS.items()
         for eye in changes.EYES
     )  # fmt: skip
@@ -172,7 +178,7 @@ def _camera_axes() -> tuple[Axis, ...]:
 
 _RIG_AXES = (
     Axis("focal", "focal lengths of both cameras", "%", (0.0, 0.05, 0.1, 0.2, 0.5, 1.0), 0.0,
-         rig=changes.change_both_focal, found_by=_BOARD),
+         rig=changes.change_both_focal, found_by=_BOARD, hidden_up_to=math.inf),
     Axis("turn-upwards", "right camera turned up or down", "deg", (0.0, 0.003, 0.01, 0.02, 0.05),
          0.0, rig=changes.change_turn(0), found_by=_BOARD),
     Axis("roll", "right camera turned in its plane", "deg", (0.0, 0.01, 0.03, 0.1, 0.3), 0.0,
@@ -184,7 +190,7 @@ _RIG_AXES = (
     *_camera_axes(),
 )  # fmt: skip
 
-# The causes stand first. An axis keeps its knees as long as it keeps its place: new ones go to the
+# An axis keeps its knees as long as it keeps its place: new ones go to the
 # end of their part, and every evaluation before that is of other knees.
 AXES: dict[str, Axis] = {
     axis.name: axis for axis in (*_CAUSES, *_PICTURE_AXES, *_PLAN_AXES, *_RIG_AXES)
