@@ -9,7 +9,7 @@ from navapp.control.stages import STAGES
 from navapp.geometry.display_model import DisplayModel
 from navapp.geometry.rig import StereoRig
 from navapp.tools.tool import Tool, ToolKind
-from navapp.tracking import Method, TrackerSettings
+from navapp.tracking import Method, Part, TrackerSettings
 from navapp.values import Plan, Prior, StageSpec
 
 _DEPTH_MM = TrackerSettings().depth_mm
@@ -46,6 +46,7 @@ class SessionSpecification:
     has_gates: bool = False
     tools: Mapping[ToolKind, Tool] = field(default_factory=dict)  # that are looked for
     check_minutes: float = 30.0  # a check on the patient counts so long
+    leaves_out: frozenset[Part] = frozenset()  # as of `TrackerSettings`, of an evaluation
 
     @property
     def display_model(self) -> DisplayModel | None:
@@ -61,7 +62,9 @@ class SessionSpecification:
     @property
     def tracker_settings(self) -> TrackerSettings:
         """Of all trackers of the session."""
-        return TrackerSettings(self.method, self.follows_refused, self.depth_mm)
+        return TrackerSettings(
+            self.method, self.follows_refused, self.depth_mm, leaves_out=self.leaves_out
+        )
 
 
 def specify_session(
@@ -81,6 +84,7 @@ def specify_session(
     made_steps: tuple[str, ...] = (),
     has_gates: bool = False,
     tools: Mapping[ToolKind, Tool] | None = None,
+    leaves_out: frozenset[Part] = frozenset(),
 ) -> SessionSpecification:
     """What is configured, for given rig, plan, prior and stage.
 
@@ -102,6 +106,7 @@ def specify_session(
         made_steps: cuts, holes and parts of the plan that are made from the start.
         has_gates: guides wait for the time-out, and stages for what their gates ask for.
         tools: that are looked for; None: none.
+        leaves_out: parts of pose estimation that are not made, to see what they are worth.
     """
     display = configuration.display
     return SessionSpecification(
@@ -126,4 +131,5 @@ def specify_session(
         has_gates=has_gates,
         tools=tools or {},
         check_minutes=configuration.stages.check_minutes,
+        leaves_out=leaves_out,
     )

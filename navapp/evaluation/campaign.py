@@ -8,13 +8,12 @@ from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar
 
 from navapp.errors import InputError, UsageError
-from navapp.evaluation.following import follow
+from navapp.evaluation.following import Answers
 from navapp.evaluation.scores import Followed
 from navapp.evaluation.sequence import KnownSequence
 from navapp.evaluation.workers import run_in_processes
 from navapp.evaluation.worst_frame import draw_worst_frame
 from navapp.geometry.whole_files import write_whole
-from navapp.tracking import Method
 
 _SETTINGS, _TESTS, _TIMES, _PICTURES = "settings.json", "tests", "times", "pictures"
 
@@ -40,8 +39,8 @@ class Campaign(Protocol[T]):
     """What is run; it is sent to other processes."""
 
     @property
-    def methods(self) -> tuple[Method, ...]:
-        """That follow every test."""
+    def methods(self) -> tuple[str, ...]:
+        """Names of those that follow every test."""
         ...
 
     def count_frames(self, test: T) -> int:
@@ -62,6 +61,10 @@ class Campaign(Protocol[T]):
         """The pictures of a test: so many that count, after the one that is registered in."""
         ...
 
+    def follow(self, sequence: KnownSequence, method: str) -> Answers:
+        """What a method of these says of a sequence."""
+        ...
+
     def __hash__(self) -> int:
         """The same campaign is warmed up for once."""
         ...
@@ -76,7 +79,7 @@ class Done(Generic[T]):
     """A test with what each method made of it."""
 
     test: T
-    followed: dict[Method, Followed]
+    followed: dict[str, Followed]
 
 
 class CampaignFolder(Generic[T]):
@@ -191,7 +194,7 @@ def run_test(folder: CampaignFolder[T], settings: Campaign[T], test: T, *, is_ti
     if is_timed:
         _warm_up(settings)
     sequence = settings.render(test, settings.count_frames(test))
-    answers = {method: follow(sequence, method) for method in settings.methods}
+    answers = {method: settings.follow(sequence, method) for method in settings.methods}
     if not is_timed and "bimcc" in answers:
         picture = draw_worst_frame(sequence, answers["bimcc"])
         if picture is not None:
@@ -210,7 +213,7 @@ def _warm_up(settings: Campaign[Any]) -> None:
     """Load what a process compiles or reads at its first frames: it belongs to no test's times."""
     sequence = settings.render(settings.tests[0], 2)
     for method in settings.methods:
-        follow(sequence, method)
+        settings.follow(sequence, method)
 
 
 def _read_settings(path: Path) -> Any:

@@ -25,7 +25,7 @@ from navapp.evaluation.sequence import KnownSequence
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.rectification import rectifier_of
 from navapp.geometry.transform import RigidTransform
-from navapp.tracking import Method
+from navapp.tracking import Method, Part
 from navapp.values import Status, TrackedFrame, Verdict
 
 # A bone that so many searches have not found is not searched for any more.
@@ -69,11 +69,13 @@ class Answers:
     surface: TriangleMesh  # of the bone, as it is drawn
 
 
-def follow(sequence: KnownSequence, method: Method) -> Answers:
+def follow(
+    sequence: KnownSequence, method: Method, leaves_out: frozenset[Part] = frozenset()
+) -> Answers:
     """Register the bone in the first frame, and follow it to the last one.
 
     The paper's two methods carry on what our judge refuses, so that they can be measured; its word
-    on them is kept.
+    on them is kept. Of ours, parts may be left out.
 
     Raises:
         NavappError: the session ended in a fault: a picture that cannot be read.
@@ -92,6 +94,7 @@ def follow(sequence: KnownSequence, method: Method) -> Answers:
         method=method,
         follows_refused=follows_refused,
         made_steps=sequence.made_steps,
+        leaves_out=leaves_out,
     )
     with ExitStack() as undo:
         camera = MemoryCamera(sequence.frames, clock, is_simulated=sequence.is_simulated)

@@ -34,12 +34,19 @@ class Scene:
     # so many neighbouring points have their errors in common and count as one.
     n_sharing_errors: float = 1.0
     thinned_to: int = 500  # the coarse loop uses about so many points
+    # model points look for partners in the scene, too; False: scene points alone, as in plain ICP.
+    pairs_backward: bool = True
 
     @classmethod
-    def from_stereo(cls, cloud: SurfaceCloud, correlation_px: float) -> "Scene":
+    def from_stereo(
+        cls, cloud: SurfaceCloud, correlation_px: float, *, pairs_backward: bool = True
+    ) -> "Scene":
         """A cloud in the rectified left camera, whose errors go together over a distance."""
         n_sharing_errors = max(1.0, (correlation_px / cloud.stride_px) ** 2)
-        return cls(cloud.points_mm, np.zeros(3), cloud.sigma_ray_mm, n_sharing_errors)
+        return cls(
+            cloud.points_mm, np.zeros(3), cloud.sigma_ray_mm, n_sharing_errors,
+            pairs_backward=pairs_backward,
+        )  # fmt: skip
 
     def __post_init__(self) -> None:
         points = np.asarray(self.points_mm)

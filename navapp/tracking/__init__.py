@@ -3,11 +3,12 @@
 from navapp.registration.verdict import Goal
 from navapp.tracking.methods import make_tracker
 from navapp.tracking.motion import TrackState
-from navapp.tracking.tracker import Method, Tracker, TrackerSettings
+from navapp.tracking.tracker import Method, Part, Tracker, TrackerSettings
 
 __all__ = [
     "Goal",
     "Method",
+    "Part",
     "TrackState",
     "Tracker",
     "TrackerSettings",

@@ -36,8 +36,6 @@ class BimccTracker(Tracker):
     (docs/how/registration.md). The other parts have defaults; a test replaces them.
     """
 
-    tells_foreground = True
-
     def __init__(
         self,
         rig: StereoRig,
@@ -55,8 +53,11 @@ class BimccTracker(Tracker):
     ) -> None:
         super().__init__(rig, bone, settings, judge, diagnosis, meter)
         meter, scorer = self.meter, self.scorer
+        left_out = self.settings.leaves_out
+        self.tells_foreground = "fill" not in left_out
         self.near = near or NearSearch(meter, scorer.score)
         self.highlights = highlights or HighlightSearch(meter)
+        self._looks_again = "second look" not in left_out
         self.buried = buried or BuriedSearch(meter)
         self.after_loss = after_loss or SearchAfterLoss(meter, self.near, scorer)
         self.whole_view = WholeViewSearch(meter, aspects)
@@ -138,7 +139,8 @@ class BimccTracker(Tracker):
             checks: as of `judge_fits`.
         """
         pose = answer.left_from_bone
-        if pose is None or not is_worth_a_second_look(answer.verdict):
+        is_worth_it = self._looks_again and is_worth_a_second_look(answer.verdict)
+        if pose is None or not is_worth_it:
             return answer
         fits = self.highlights.find(frame, self.rectify_pose(pose))
         again = self.judge_fits(frame, fits, goal, predicted, checks=checks)

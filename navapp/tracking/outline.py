@@ -152,6 +152,23 @@ class OutlineMeter:
         return jacobian, _EDGE_SIGMA_PX**2 + surface_px**2, n_sharing
 
 
+class NoOutline:
+    """Stands for the outline where a fit is to stay what the surface alone says."""
+
+    def join(
+        self,
+        pair: RectifiedPair,
+        fit: Fit,
+        coarse_px: NDArray[np.float32] | None,
+        noise_variance_ratio: float = 1.0,
+    ) -> Fit:
+        """The fit under the surface's own noise, as `OutlineMeter.join` leaves it without one."""
+        if fit.measured.rendered is None or not fit.estimate.has_finite_covariance:
+            return fit
+        covariance = noise_variance_ratio * fit.estimate.covariance
+        return replace(fit, estimate=replace(fit.estimate, covariance=covariance))
+
+
 def _only(rim: Rim, kept: NDArray[np.bool_]) -> Rim:
     return Rim(
         rim.point[kept], rim.pixel[kept], rim.normal[kept], rim.length[kept], rim.vertex[kept]

@@ -74,11 +74,14 @@ class Measurement:
     correlation_px: float  # distance in the picture over which its errors go together
     # the model that it was measured on; None of a free measurement.
     rendered: RenderedView | None = None
+    pairs_backward: bool = True  # as of `Scene`
 
     @property
     def scene(self) -> Scene:
         """The cloud, to be registered to."""
-        return Scene.from_stereo(self.cloud, self.correlation_px)
+        return Scene.from_stereo(
+            self.cloud, self.correlation_px, pairs_backward=self.pairs_backward
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,6 +101,7 @@ class SurfaceMeter:
         model: of the bone.
         depth_mm: nearest and farthest surface that the rig is used for.
         max_points: about so many enter a cloud.
+        pairs_backward: as of `Scene`, of all that is measured.
     """
 
     def __init__(
@@ -106,8 +110,11 @@ class SurfaceMeter:
         model: RegistrationModel,
         depth_mm: tuple[float, float],
         max_points: int,
+        *,
+        pairs_backward: bool = True,
     ) -> None:
         self.model, self.depth_mm, self._max_points = model, depth_mm, max_points
+        self.pairs_backward = pairs_backward
         self.rectifier = rectifier_of(rig)
         self.geometry = self.rectifier.geometry
         self._reduced = {n: ReducedRectifier(self.rectifier, n) for n in NearerSearch.REDUCTIONS}
@@ -174,7 +181,7 @@ class SurfaceMeter:
             return None
         box, band_px = region
         found = match_surface(replace(pair, box=box), band_px, fills=False).disparity
-        return Measurement(found, self._cloud(found), found.matched_fraction, FREE_CORRELATION_PX)
+        return self._measured_freely(found, self._cloud(found))
 
     def take_surface(self, found: DisparityMap, n_points: int) -> Measurement:
         """A free measurement from a map that was matched elsewhere: filled pixels count as well.
@@ -186,7 +193,7 @@ class SurfaceMeter:
         cloud = found.reproject(self.geometry, stride_px, tuple(Origin)[1:])
         if len(cloud) > n_points:
             cloud = cloud.select(np.linspace(0, len(cloud) - 1, n_points).astype(np.intp))
-        return Measurement(found, cloud, found.matched_fraction, FREE_CORRELATION_PX)
+        return self._measured_freely(found, cloud)
 
     def measure_coarsely(
         self, pair: RectifiedPair, pose: RigidTransform, box: Box | None = None
@@ -224,8 +231,7 @@ class SurfaceMeter:
         is_expected = np.isfinite(expected.support_px)
         cloud = self._cloud(remove_gap_rims(found, is_expected))
         n_expected = max(int(np.count_nonzero(is_expected)), 1)
-        matched_fraction = found.n_matched / n_expected
-        return Measurement(found, cloud, matched_fraction, MODEL_CORRELATION_PX, expected.view)
+        return self._measured_on_model(found, cloud, found.n_matched / n_expected, expected)
 
     def measure_on_samples(self, expected: Expected) -> Measurement:
         """As `measure_on_model` at every sixth pixel each way, in more steps: it sees further.
@@ -239,7 +245,21 @@ class SurfaceMeter:
         matched_fraction = int(np.count_nonzero(thin.origin)) / n_asked
         found = _spread(thin, _SAMPLES_PX, support_px.shape)
         cloud = found.reproject(self.geometry, _SAMPLES_PX)
-        return Measurement(found, cloud, matched_fraction, MODEL_CORRELATION_PX, expected.view)
+        return self._measured_on_model(found, cloud, matched_fraction, expected)
+
+    def _measured_freely(self, found: DisparityMap, cloud: SurfaceCloud) -> Measurement:
+        return Measurement(
+            found, cloud, found.matched_fraction, FREE_CORRELATION_PX,
+            pairs_backward=self.pairs_backward,
+        )  # fmt: skip
+
+    def _measured_on_model(
+        self, found: DisparityMap, cloud: SurfaceCloud, matched_fraction: float, expected: Expected
+    ) -> Measurement:
+        return Measurement(
+            found, cloud, matched_fraction, MODEL_CORRELATION_PX, expected.view,
+            self.pairs_backward,
+        )  # fmt: skip
 
     def _cloud(self, found: DisparityMap) -> SurfaceCloud:
         """About `max_points` of the measured ones."""

@@ -20,12 +20,15 @@ from navapp.tracking.diagnosis import Diagnosis
 from navapp.tracking.frame import FREE_SETTINGS, Fit, Frame, RectifyBox, ignore
 from navapp.tracking.judging import PoseJudge
 from navapp.tracking.motion import TrackState
+from navapp.tracking.outline import NoOutline
 from navapp.tracking.row_times import RowTimes
 from navapp.tracking.scoring import FitScorer
 from navapp.tracking.surface_meter import NEAR_BOX, NEAR_VIEW, WIDE_VIEW, Margins, SurfaceMeter
 from navapp.values import BoneModel, Prior, Reason, Status, Stopwatch, TrackedFrame, Verdict
 
 Method = Literal["bimcc", "paper", "icp"]
+# What can be left out of the production chain, to see what it is worth.
+Part = Literal["fill", "backward pairs", "contour", "second look", "judge"]
 
 # So often, in lost frames, it is asked whether the pictures are swapped; chosen.
 _FRAMES_BETWEEN_DIAGNOSES = 10
@@ -42,6 +45,8 @@ class TrackerSettings:
     # nearest and farthest surface that the rig is used for.
     depth_mm: tuple[float, float] = (300.0, 700.0)
     max_points: int = 2500  # about so many measured points enter a fit
+    # parts of `bimcc` that are not made; nothing but an evaluation asks for that.
+    leaves_out: frozenset[Part] = frozenset()
 
 
 class Tracker(ABC):
@@ -75,10 +80,19 @@ class Tracker(ABC):
     ) -> None:
         self.settings = settings or TrackerSettings()
         depth_mm, max_points = self.settings.depth_mm, self.settings.max_points
-        self.meter = meter or SurfaceMeter(rig, RegistrationModel(bone), depth_mm, max_points)
+        left_out = self.settings.leaves_out
+        self.meter = meter or SurfaceMeter(
+            rig, RegistrationModel(bone), depth_mm, max_points,
+            pairs_backward="backward pairs" not in left_out,
+        )  # fmt: skip
         self.model = self.meter.model
-        keeps = self.settings.follows_refused
-        self.judge = judge or PoseJudge(self.meter, rig.quality, tells_refused=keeps)
+        self.judge = judge or PoseJudge(
+            self.meter,
+            rig.quality,
+            NoOutline() if "contour" in left_out else None,
+            tells_refused=self.settings.follows_refused,
+            believes_all="judge" in left_out,
+        )
         self.boxes = BoxTracker(rig, self.model)
         self.scorer = FitScorer(self.meter)
         self.diagnosis = diagnosis or Diagnosis(self.meter, self.scorer)

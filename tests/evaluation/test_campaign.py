@@ -56,10 +56,9 @@ def line(monkeypatch) -> Iterator[Line]:
             do(item)
             yield item
 
-    for name, value in (
-        ("run_in_processes", run_here), ("follow", line.follow), ("draw_worst_frame", line.draw),
-    ):  # fmt: skip
+    for name, value in (("run_in_processes", run_here), ("draw_worst_frame", line.draw)):
         monkeypatch.setattr(campaign, name, value)
+    monkeypatch.setattr(settings_of_tables, "follow", line.follow)
     monkeypatch.setattr(CaseTest, "render", lambda test, n_frames: line.render(test, n_frames))
     campaign._warm_up.cache_clear()
     yield line

@@ -230,3 +230,20 @@ def test_a_simulated_test_knows_where_the_bone_is(knee) -> None:
     times_ns = [frame.captured_ns for frame in knee.frames]
     assert sorted(set(times_ns)) == times_ns
     assert set(knee.made_steps) <= set(knee.plan.content.steps)
+
+
+def test_what_is_left_out_reaches_the_tracker_and_nothing_is_by_default(monkeypatch) -> None:
+    made = []
+
+    def make_tracker(_, bone, settings, *__):
+        made.append(settings)
+        return FakeTracker(Script(), bone)
+
+    make = partial(SessionController, make_tracker=make_tracker)
+    monkeypatch.setattr(following, "SessionController", make)
+    for parts in (frozenset(), frozenset({"contour", "judge"})):
+        follow(a_sequence(), "bimcc", parts)
+        assert made[-1].leaves_out == parts
+        assert not made[-1].follows_refused
+    follow(a_sequence(), "bimcc")
+    assert made[-1].leaves_out == frozenset()

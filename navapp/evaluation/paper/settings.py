@@ -1,9 +1,10 @@
 """What is run for the paper's tables."""
 
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, cast
 
 from navapp import __version__
+from navapp.evaluation.following import Answers, follow
 from navapp.evaluation.paper.cases import (
     SITUATIONS,
     SWEEP_FRAMES,
@@ -56,3 +57,7 @@ class TableSettings:
     def render(self, test: CaseTest, n_frames: int) -> KnownSequence:
         """The pictures of a test, and one before them."""
         return test.render(n_frames + 1)
+
+    def follow(self, sequence: KnownSequence, method: str) -> Answers:
+        """What one of the methods says of a sequence."""
+        return follow(sequence, cast("Method", method))

@@ -10,6 +10,7 @@ from navapp import __version__
 from navapp.config import Configuration
 from navapp.config.camera_sections import CameraSection, SimulationSection
 from navapp.devices.simulated_room import find_cartilage_mm
+from navapp.evaluation.following import Answers, follow
 from navapp.evaluation.sequence import KnownSequence, render_room
 from navapp.evaluation.stress.axes import AXES, Axis, find_seed, is_moving_fully
 from navapp.evaluation.stress.changes import BONE
@@ -114,6 +115,10 @@ class StressSettings:
     def render(self, test: StressTest, n_frames: int) -> KnownSequence:
         """The pictures of a test."""
         return test.render(n_frames)
+
+    def follow(self, sequence: KnownSequence, method: str) -> Answers:
+        """What our method says of a sequence."""
+        return follow(sequence, "bimcc")
 
     def _list_tests(self) -> Iterator[StressTest]:
         for name in self.axes:

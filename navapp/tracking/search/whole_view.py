@@ -45,7 +45,10 @@ class WholeViewSearch:
         geometry, model = self._meter.geometry, self._meter.model
         found = match_surface(pair, self._meter.band_px, fills=False).disparity
         stride_px = max(1, int(np.ceil((found.n_matched / _MOST_POINTS) ** 0.5)))
-        scene = Scene.from_stereo(found.reproject(geometry, stride_px), FREE_CORRELATION_PX)
+        cloud = found.reproject(geometry, stride_px)
+        scene = Scene.from_stereo(
+            cloud, FREE_CORRELATION_PX, pairs_backward=self._meter.pairs_backward
+        )
         cone = prior.cones.get(model.bone.name, ViewCone())
         return find_initial(pair, scene, model, cone, self._aspects, on_progress=on_progress)
 
