@@ -1,4 +1,4 @@
-"""What the tables and the stress matrix of `navapp evaluate` share: counts, running, results."""
+"""What tables, stress matrix and ablation of `navapp evaluate` share: counts, running, results."""
 
 import argparse
 import os
@@ -11,6 +11,7 @@ from navapp.errors import UsageError
 
 if TYPE_CHECKING:
     from navapp.evaluation.campaign import Campaign, CampaignFolder
+    from navapp.evaluation.paper.cases import Case
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +55,27 @@ def read_counts(
     if seed < 0:
         raise UsageError("--seed must not be negative")
     return Counts(tests, frames, seed)
+
+
+def choose_cases(
+    options: argparse.Namespace, usual_samples: list[str] | None = None
+) -> "tuple[Case, ...]":
+    """Of --samples, --stages and --situations, in the order of the tables.
+
+    Args:
+        options: of the command line.
+        usual_samples: where --samples is left out; None: all.
+    """
+    from navapp.evaluation.paper.cases import ALL_CASES
+
+    samples = usual_samples if options.samples is None else options.samples
+    return tuple(
+        case
+        for case in ALL_CASES
+        if is_chosen(case.sample, samples)
+        and is_chosen(case.stage, options.stages)
+        and is_chosen(case.situation, options.situations)
+    )
 
 
 def is_chosen(name: str, chosen: list[str] | None) -> bool:

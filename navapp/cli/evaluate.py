@@ -3,8 +3,15 @@
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from navapp.cli.campaign_options import Counts, is_chosen, read_counts, run_and_write
+from navapp.cli.campaign_options import (
+    Counts,
+    choose_cases,
+    is_chosen,
+    read_counts,
+    run_and_write,
+)
 from navapp.cli.diagnostics import Diagnostics
+from navapp.cli.evaluate_ablation import add_ablation_options, run_ablation
 from navapp.cli.evaluate_recording import add_options, check_no_recording, run_recording
 from navapp.cli.evaluate_stress import add_stress_options, check_no_stress, run_stress
 from navapp.errors import UsageError
@@ -18,6 +25,7 @@ examples:
   navapp evaluate --out tables/                  all of it: about two hours on two cores
   navapp evaluate --stages opening --methods bimcc --tests 2 --out opening/
   navapp evaluate --stress --out stress/         one thing at a time made worse: hours
+  navapp evaluate --ablation --out parts/        bimcc without one of its parts at a time
   navapp evaluate --recording pairs/ --rig rig.yml --plan P --truth truth.json --out study/
 
 3 samples x 5 stages x 4 situations x 3 methods, 5 tests each, every test another simulated knee,
@@ -59,6 +67,7 @@ def add_parser(subparsers: Any) -> None:
         "--processes", type=int, metavar="N", help="at a time (the computer's cores, at most 4)"
     )
     add_stress_options(parser)
+    add_ablation_options(parser)
     add_options(parser)
     parser.add_argument("--out", metavar="DIR", required=True, help="folder for the results")
     parser.add_argument("--json", metavar="FILE", help="result for programs (- is stdout)")
@@ -74,6 +83,8 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     if options.stress:
         return _run_stress(options, diagnostics)
     check_no_stress(options)
+    if options.ablation:
+        return run_ablation(options, diagnostics)
     settings = _read_settings(options)
     content = run_and_write(
         settings,
@@ -91,6 +102,8 @@ def _run_stress(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     for name in ("samples", "stages", "situations", "methods"):
         if getattr(options, name) is not None:
             raise UsageError(f"--{name} is of the tables", remedy="leave it out, or --stress")
+    if options.ablation:
+        raise UsageError("--stress and --ablation are two evaluations", remedy="run one at a time")
     return run_stress(options, diagnostics)
 
 
@@ -99,7 +112,7 @@ def _run_recording(options: argparse.Namespace, diagnostics: Diagnostics) -> int
 
     of_knees = (
         "samples", "stages", "situations", "tests", "frames", "seed", "quick", "processes",
-        "stress", "axes",
+        "stress", "axes", "ablation",
     )  # fmt: skip
     for name in of_knees:
         # A seed of 0 is given as well.
@@ -112,21 +125,19 @@ def _run_recording(options: argparse.Namespace, diagnostics: Diagnostics) -> int
 
 
 def _read_settings(options: argparse.Namespace) -> "TableSettings":
-    from navapp.evaluation.paper.cases import ALL_CASES, FIRST_SEED, METHODS, MOST_TESTS
+    from navapp.evaluation.paper.cases import FIRST_SEED, METHODS, MOST_TESTS
     from navapp.evaluation.paper.settings import TableSettings
 
     usual = Counts(_TESTS, _FRAMES, FIRST_SEED)
     counts = read_counts(options, usual, _QUICK_FRAMES, MOST_TESTS, "case")
-    cases = tuple(
-        case
-        for case in ALL_CASES
-        if is_chosen(case.sample, options.samples)
-        and is_chosen(case.stage, options.stages)
-        and is_chosen(case.situation, options.situations)
-    )
     methods = tuple(name for name in METHODS if is_chosen(name, options.methods))
     return TableSettings(
-        cases, methods, counts.tests, counts.frames, counts.first_seed, options.quick
+        choose_cases(options),
+        methods,
+        counts.tests,
+        counts.frames,
+        counts.first_seed,
+        options.quick,
     )
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from navapp.evaluation.ablation.settings import FIRST_ABLATION_SEED
 from navapp.evaluation.paper.cases import (
     ALL_CASES,
     FIRST_SEED,
@@ -24,7 +25,9 @@ from sim_devices.motion import SWEEP_PERIOD_S, compute_sweep_offset_mm
 ROOT = Path(__file__).parents[3]
 SEEDS = range(FIRST_SEED, FIRST_SEED + len(ALL_CASES) * MOST_TESTS)
 # Those of the stress matrix follow.
-RESERVED = range(FIRST_SEED, FIRST_STRESS_SEED + len(AXES) * MOST_KNEES)
+WITH_STRESS = range(FIRST_SEED, FIRST_STRESS_SEED + len(AXES) * MOST_KNEES)
+ABLATION = range(FIRST_ABLATION_SEED, FIRST_ABLATION_SEED + len(SEEDS))
+RESERVED = {*WITH_STRESS, *ABLATION}
 # Numbers that are no seeds: where a mirror is driven to, round numbers, and where a range is told.
 NO_SEEDS = {
     ("tests/drivers/test_zaber_mirror.py", SEEDS[-1]),
@@ -33,7 +36,10 @@ NO_SEEDS = {
     ("docs/evaluation.md", SEEDS[-1]),
     ("navapp/evaluation/stress/axes.py", FIRST_STRESS_SEED),
     ("docs/evaluation.md", FIRST_STRESS_SEED),
-    ("docs/evaluation.md", RESERVED[-1]),
+    ("docs/evaluation.md", WITH_STRESS[-1]),
+    ("navapp/evaluation/ablation/settings.py", FIRST_ABLATION_SEED),
+    ("docs/evaluation.md", FIRST_ABLATION_SEED),
+    ("docs/evaluation.md", ABLATION[-1]),
     ("navapp/ui/line_panel.py", 99_999),
     ("tests/inventory/test_system_checks.py", 99_999),
     ("tests/drivers/test_pjlink_projector.py", 100_000),
@@ -134,6 +140,12 @@ def test_no_test_bench_or_default_uses_a_seed_of_the_evaluation() -> None:
         if number in RESERVED and path != Path(__file__)
     }
     assert used - NO_SEEDS == set()
+
+
+def test_the_ablation_has_seeds_of_its_own() -> None:
+    tests = list(list_tests(ALL_CASES, MOST_TESTS, FIRST_ABLATION_SEED))
+    assert [test.seed for test in tests] == list(ABLATION)
+    assert WITH_STRESS.stop <= FIRST_ABLATION_SEED
 
 
 def test_a_seed_would_be_found(tmp_path) -> None:

@@ -1,0 +1,71 @@
+"""`navapp evaluate --ablation`: our method without one of its parts at a time."""
+
+import argparse
+from typing import TYPE_CHECKING, Any
+
+from navapp.cli.campaign_options import Counts, choose_cases, read_counts, run_and_write
+from navapp.cli.diagnostics import Diagnostics
+from navapp.errors import UsageError
+
+if TYPE_CHECKING:
+    from navapp.evaluation.ablation.settings import AblationSettings
+
+_SAMPLES, _TESTS, _FRAMES, _QUICK_FRAMES = ["man"], 2, 40, 5
+
+
+def add_ablation_options(parser: argparse.ArgumentParser) -> None:
+    """Declare the option of the ablation."""
+    group = parser.add_argument_group("an ablation instead of the tables")
+    group.add_argument(
+        "--ablation",
+        action="store_true",
+        help="bimcc without one of its parts at a time, on the same pictures (by default sample "
+        f"{_SAMPLES[0]}, {_TESTS} tests of each case)",
+    )
+
+
+def run_ablation(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
+    """Do it; the exit code."""
+    from navapp.evaluation.ablation.results import write_ablation
+
+    settings = _read_settings(options)
+    content = run_and_write(
+        settings,
+        lambda folder: write_ablation(folder, settings),
+        "ablation.json",
+        options,
+        diagnostics,
+    )
+    if options.json != "-":
+        _say(content["summary"], options.out, diagnostics)
+    return 0
+
+
+def _read_settings(options: argparse.Namespace) -> "AblationSettings":
+    from navapp.evaluation.ablation.settings import FIRST_ABLATION_SEED, AblationSettings
+    from navapp.evaluation.paper.cases import MOST_TESTS
+    from navapp.evaluation.paper.settings import TableSettings
+
+    if options.methods is not None:
+        raise UsageError("--methods is of the tables", remedy="leave it out, or --ablation")
+    usual = Counts(_TESTS, _FRAMES, FIRST_ABLATION_SEED)
+    counts = read_counts(options, usual, _QUICK_FRAMES, MOST_TESTS, "case")
+    cases = choose_cases(options, _SAMPLES)
+    knees = TableSettings(
+        cases, ("bimcc",), counts.tests, counts.frames, counts.first_seed, options.quick
+    )
+    return AblationSettings(knees)
+
+
+def _say(summary: dict[str, Any], out: str, diagnostics: Diagnostics) -> None:
+    if summary["quick"]:
+        diagnostics.say("a quick look, no results: one short test of each case")
+    for row in summary["variants"]:
+        mean_mm, any_mm = (
+            "-" if row[name] is None else f"{row[name]:.3f}" for name in ("tre_ok_mm", "tre_any_mm")
+        )
+        diagnostics.say(
+            f"{row['variant']}: {row['n_ok']} of {row['n_frames']} frames OK, TRE mean {mean_mm} "
+            f"mm, of all poses {any_mm} mm, OK and wrong: {row['n_wrong']}"
+        )
+    diagnostics.say(f"tables, report and all frames: {out}")

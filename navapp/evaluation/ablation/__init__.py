@@ -1,0 +1,1 @@
+"""What each part of our method is worth: the same frames without it."""

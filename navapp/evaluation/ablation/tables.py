@@ -1,0 +1,126 @@
+"""The tables of an ablation as Markdown."""
+
+from collections.abc import Sequence
+
+from navapp.evaluation.ablation.rows import ALL, VariantRow
+from navapp.evaluation.ablation.settings import WHOLE, WITHOUT_FILL
+from navapp.evaluation.paper.cases import SITUATIONS
+
+_ABOUT = (
+    "`bimcc` is the method of the product; every other row leaves one part of it out, and follows "
+    "the same pictures. TRE: mean over the stage's targets, of frames that are OK, and of all with "
+    "a pose whatever is said of them. OK and wrong: OK, more than 1 mm off and more than the "
+    "predicted bound. Within: share of OK frames within their bound. Same: share of frames of "
+    "which verdict, errors and bound are those of `bimcc` to the last bit. ms: processing time of "
+    "a frame from rectification to overlay, median and mean; the variants are timed one after the "
+    "other, and rows with the same answers show how much such times scatter.\n"
+)
+_PARTS = (
+    "- without filled depth: the fill of the depth around the bone tells what stands in front of "
+    "it, so that guides are hidden behind hands and instruments. It is no part of the pose: what "
+    "is measured here is its time.",
+    "- without bidirectional pairs: measured points look for partners on the model, as in plain "
+    "ICP; the model's points look for none. In a frame that begins within millimetres of the pose "
+    "the whole method pairs this way as well: what can differ is the first registration, and the "
+    "search for a bone that was lost.",
+    "- without contour: the pose is that of the surface alone.",
+    "- without second look: a doubted bone is not looked at again without what is mirrored in it.",
+    "- without judge: every pose that is found is taken as OK and carried on, so that doubt begins "
+    "no search either. This is what would have been shown.",
+)
+_COLUMNS = (
+    "OK", "TRE mean OK, mm", "TRE mean of all poses, mm", "worst OK, mm", "OK and wrong", "within",
+    "same", "ms median", "ms mean",
+)  # fmt: skip
+
+
+def make_ablation_tables(
+    rows: Sequence[VariantRow], about: Sequence[str], *, is_quick: bool
+) -> str:
+    """The whole of `ablation.md`.
+
+    Args:
+        rows: of all stages and situations, those of `ALL` among them.
+        about: how it was made, a line each.
+        is_quick: it is a short look, and says so.
+    """
+    parts = ["# What each part is worth, on simulated knees", ""]
+    if is_quick:
+        parts += [
+            "**A quick look: one short test of each case, times taken while others ran. These are "
+            "no results.**",
+            "",
+        ]
+    parts += [*(f"- {line}" for line in about), "", _ABOUT, *_PARTS, ""]
+    places = list(dict.fromkeys((row.stage, row.situation) for row in rows))
+    for place in places:
+        some = [row for row in rows if (row.stage, row.situation) == place]
+        parts += [*_format_place(*place, some), ""]
+    return "\n".join(parts)
+
+
+def _format_place(stage: str, situation: str, rows: Sequence[VariantRow]) -> list[str]:
+    is_all = stage == ALL
+    told = next((one.title for name, one in SITUATIONS.items() if name == situation), situation)
+    columns = [*_COLUMNS, "registration, s"] if is_all else [*_COLUMNS]
+    title = "All stages and situations" if is_all else f"Stage {stage}, {told}"
+    lines = [
+        f"## {title}",
+        "",
+        f"{rows[0].n_tests} tests, {rows[0].n_frames} frames.",
+        "",
+        f"| | {' | '.join(columns)} |",
+        "|---" * (len(columns) + 1) + "|",
+    ]
+    lines += [_format_row(row, has_registration=is_all) for row in rows]
+    return [*lines, "", tell_fill(rows)] if is_all else lines
+
+
+def _format_row(row: VariantRow, *, has_registration: bool) -> str:
+    cells = [
+        f"`{row.variant}`" if row.variant == WHOLE else row.variant,
+        _share(row.ok_share),
+        _mm(row.tre_ok_mm),
+        _mm(row.tre_any_mm),
+        _mm(row.worst_ok_mm),
+        f"{row.n_wrong}",
+        _share(row.coverage),
+        _share(row.n_same / max(row.n_frames, 1)),
+        _number(row.median_ms, 0),
+        _number(row.mean_ms, 0),
+    ]
+    cells += [_number(row.registration_s, 2)] if has_registration else []
+    return "| " + " | ".join(cells) + " |"
+
+
+def tell_fill(rows: Sequence[VariantRow]) -> str:
+    """What the fill changes and costs, of the rows of one place."""
+    found = {row.variant: row for row in rows}
+    whole, without = found[WHOLE], found[WITHOUT_FILL]
+    told = (
+        f"Without filled depth {without.n_same} of {without.n_frames} frames have the same "
+        "verdict, errors and bound to the last bit."
+    )
+    if whole.median_ms is None or without.median_ms is None:
+        return told
+    return (
+        f"{told} The median frame took {whole.median_ms:.1f} ms with the fill, and "
+        f"{without.median_ms:.1f} ms without it and the hiding of guides."
+    )
+
+
+def _mm(value: float | None) -> str:
+    return _number(value, 3 if value is None or value < 10.0 else 0)
+
+
+def _number(value: float | None, n_digits: int) -> str:
+    return "-" if value is None else f"{value:.{n_digits}f}"
+
+
+def _share(value: float | None) -> str:
+    """Whole; only all is 100 %, and only nothing 0 %."""
+    if value is None:
+        return "-"
+    if 0.0 < value < 0.01:
+        return "< 1 %"
+    return "> 99 %" if 0.99 < value < 1.0 else f"{100.0 * value:.0f} %"

@@ -1,0 +1,108 @@
+"""Tables, report and files of an ablation."""
+
+import csv
+import json
+
+import pytest
+
+from navapp.evaluation.ablation.results import write_ablation
+from navapp.evaluation.ablation.settings import VARIANTS, AblationSettings
+from navapp.evaluation.campaign import CampaignFolder
+from navapp.evaluation.paper.cases import Case
+from navapp.evaluation.paper.settings import TableSettings
+from tests.evaluation.scored import followed, score
+
+CASES = (Case("man", "opening", "overlay"), Case("man", "patella", "instrument"))
+SETTINGS = AblationSettings(TableSettings(CASES, ("bimcc",), 1, 2, 1))
+GOOD = (score(0.1, index=1), score(0.2, index=2))
+FRAMES = {
+    "without contour": (score(0.3, index=1), score(0.4, index=2)),
+    "without judge": (score(0.1, index=1), score(12.0, index=2)),
+    "without second look": (score(0.1, index=1), score(None, "LOST", index=2, bound_mm=None)),
+}
+
+
+def keep(folder: CampaignFolder, n_tests: int = 2) -> None:
+    for test in SETTINGS.tests[:n_tests]:
+        methods = {name: followed(*FRAMES.get(name, GOOD)).to_json() for name in VARIANTS}
+        content = {"test": test.name, "seed": test.seed, "methods": methods}
+        for is_timed in (False, True):
+            folder.file_of(test, is_timed=is_timed).write_text(json.dumps(content))
+
+
+@pytest.fixture
+def written(tmp_path):
+    folder = CampaignFolder(tmp_path, SETTINGS)
+    keep(folder)
+    return tmp_path, write_ablation(folder, SETTINGS)
+
+
+def test_every_stage_and_situation_has_a_table_of_all_variants(written) -> None:
+    path, content = written
+    assert len(content["rows"]) == 2 * len(VARIANTS)
+    assert [row["variant"] for row in content["summary"]["variants"]] == list(VARIANTS)
+    assert (content["summary"]["tests"], content["summary"]["of"]) == (2, 2)
+    text = (path / "ablation.md").read_text()
+    headings = [line for line in text.splitlines() if line.startswith("#")]
+    assert headings == [
+        "# What each part is worth, on simulated knees", "## All stages and situations",
+        "## Stage opening, image overlay: the leg breathes",
+        "## Stage patella, an instrument moves, the leg breathes",
+    ]  # fmt: skip
+    whole, believed, unlooked = (
+        "| `bimcc` | 100 % | 0.150 | 0.150 | 0.200 | 0 | 100 % | 100 % | 20 | 20 |",
+        "| without judge | 100 % | 6.050 | 6.050 | 12 | 1 | 50 % | 50 % | 20 | 20 |",
+        "| without second look | 50 % | 0.100 | 0.100 | 0.100 | 0 | 100 % | 50 % | 20 | 20 |",
+    )
+    lines = text.splitlines()
+    assert [lines.count(line) for line in (whole, believed, unlooked)] == [2, 2, 2]
+    assert f"{whole} 1.00 |" in lines, "all together, with the time of a registration"
+    assert "2 tests, 4 frames." in lines
+
+
+def test_the_fill_is_told_in_words(written) -> None:
+    path, _ = written
+    told = (
+        "Without filled depth 4 of 4 frames have the same verdict, errors and bound to the last "
+        "bit. The median frame took 20.0 ms with the fill, and 20.0 ms without it and the hiding "
+        "of guides."
+    )
+    assert told in (path / "ablation.md").read_text()
+
+
+def test_every_frame_is_in_the_csv_and_the_report_needs_nothing_else(written) -> None:
+    path, _ = written
+    rows = list(csv.DictReader((path / "frames.csv").read_text().splitlines()))
+    assert len(rows) == 2 * len(VARIANTS) * 2
+    assert (rows[0]["stage"], rows[0]["seed"], rows[0]["variant"], rows[0]["tre_mm"]) == (
+        "opening", str(SETTINGS.tests[0].seed), "bimcc", "0.1",
+    )  # fmt: skip
+    page = (path / "report.html").read_text()
+    assert page.count("<svg") == 1
+    assert "http://" not in page.replace("http://www.w3.org", "")
+
+
+def test_what_is_missing_is_left_out_and_told(tmp_path) -> None:
+    folder = CampaignFolder(tmp_path, SETTINGS)
+    assert write_ablation(folder, SETTINGS)["rows"] == []
+    assert "0 of 2 tests" in (tmp_path / "ablation.md").read_text()
+    keep(folder, 1)
+    content = write_ablation(folder, SETTINGS)
+    assert {row["stage"] for row in content["rows"]} == {"opening"}
+    text = (tmp_path / "ablation.md").read_text()
+    assert "1 of 2 tests" in text
+    assert "2 frames each after the registration (90 with an instrument)" in text
+
+
+def test_a_quick_look_says_so_and_has_the_times_of_its_tests(tmp_path) -> None:
+    quick = AblationSettings(TableSettings(CASES, ("bimcc",), 1, 2, 1, is_quick=True))
+    folder = CampaignFolder(tmp_path, quick)
+    keep(folder)
+    for test in quick.tests:
+        folder.file_of(test, is_timed=True).unlink()
+    content = write_ablation(folder, quick)
+    assert content["summary"]["quick"]
+    assert content["rows"][0]["median_ms"] == 20.0
+    text = (tmp_path / "ablation.md").read_text()
+    assert "no results" in text
+    assert "with an instrument)" not in text
