@@ -13,6 +13,8 @@ from navapp.evaluation.paper.rows import is_within_bound, is_wrong
 from navapp.evaluation.scores import FrameScore
 
 ALL = "all"
+# A fit that begins elsewhere within its basin ends at the same pose to far less.
+ALIKE_MM = 0.001
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +34,7 @@ class VariantRow:
     n_wrong: int  # OK, further off than 1 mm and than their bound
     coverage: float | None  # of OK frames, the share within their bound
     n_same: int  # verdict, errors and bound are those of the whole method to the last bit
+    n_alike: int  # the status is, and the error within `ALIKE_MM`
     # processing time of a frame in which the bone was followed, from the pass of its own.
     median_ms: float | None
     mean_ms: float | None
@@ -104,6 +107,7 @@ def _make_row(
         n_wrong=sum(is_wrong(frame) for frame in ok),
         coverage=_mean([is_within_bound(frame) for frame in ok]),
         n_same=sum(_is_same(*both) for both in zip(frames, whole, strict=True)),
+        n_alike=sum(_is_alike(*both) for both in zip(frames, whole, strict=True)),
         median_ms=float(np.median(times_ms)) if times_ms else None,
         mean_ms=_mean(times_ms),
         registration_s=_mean(seconds),
@@ -120,6 +124,12 @@ def _is_same(one: FrameScore, other: FrameScore) -> bool:
         )  # fmt: skip
 
     return told(one) == told(other)
+
+
+def _is_alike(one: FrameScore, other: FrameScore) -> bool:
+    if one.tre_mm is None or other.tre_mm is None:
+        return (one.status, one.tre_mm) == (other.status, other.tre_mm)
+    return one.status == other.status and abs(one.tre_mm - other.tre_mm) <= ALIKE_MM
 
 
 def _mean(values: Sequence[float]) -> float | None:

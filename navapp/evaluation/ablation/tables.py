@@ -2,18 +2,19 @@
 
 from collections.abc import Sequence
 
-from navapp.evaluation.ablation.rows import ALL, VariantRow
+from navapp.evaluation.ablation.rows import ALIKE_MM, ALL, VariantRow
 from navapp.evaluation.ablation.settings import WHOLE, WITHOUT_FILL
 from navapp.evaluation.paper.cases import SITUATIONS
 
 _ABOUT = (
     "`bimcc` is the method of the product; every other row leaves one part of it out, and follows "
     "the same pictures. TRE: mean over the stage's targets, of frames that are OK, and of all with "
-    "a pose whatever is said of them. OK and wrong: OK, more than 1 mm off and more than the "
-    "predicted bound. Within: share of OK frames within their bound. Same: share of frames of "
-    "which verdict, errors and bound are those of `bimcc` to the last bit. ms: processing time of "
-    "a frame from rectification to overlay, median and mean; the variants are timed one after the "
-    "other, and rows with the same answers show how much such times scatter.\n"
+    "a pose whatever is said of them: where a bone is lost, these are what searches came upon. OK "
+    "and wrong: OK, more than 1 mm off and more than the predicted bound. Within: share of OK "
+    "frames within their bound. Alike: share of frames whose status is that of `bimcc`, and whose "
+    f"TRE is within {ALIKE_MM:g} mm of it. ms: processing time of a frame from rectification to "
+    "overlay, median and mean; the variants are timed one after the other, and rows with the same "
+    "answers show how much such times scatter.\n"
 )
 _PARTS = (
     "- without filled depth: the fill of the depth around the bone tells what stands in front of "
@@ -30,7 +31,7 @@ _PARTS = (
 )
 _COLUMNS = (
     "OK", "TRE mean OK, mm", "TRE mean of all poses, mm", "worst OK, mm", "OK and wrong", "within",
-    "same", "ms median", "ms mean",
+    "alike", "ms median", "ms mean",
 )  # fmt: skip
 
 
@@ -67,7 +68,7 @@ def _format_place(stage: str, situation: str, rows: Sequence[VariantRow]) -> lis
     lines = [
         f"## {title}",
         "",
-        f"{rows[0].n_tests} tests, {rows[0].n_frames} frames.",
+        f"Tests: {rows[0].n_tests}, frames: {rows[0].n_frames}.",
         "",
         f"| | {' | '.join(columns)} |",
         "|---" * (len(columns) + 1) + "|",
@@ -85,7 +86,7 @@ def _format_row(row: VariantRow, *, has_registration: bool) -> str:
         _mm(row.worst_ok_mm),
         f"{row.n_wrong}",
         _share(row.coverage),
-        _share(row.n_same / max(row.n_frames, 1)),
+        _share(row.n_alike / max(row.n_frames, 1)),
         _number(row.median_ms, 0),
         _number(row.mean_ms, 0),
     ]

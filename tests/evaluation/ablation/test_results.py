@@ -57,7 +57,7 @@ def test_every_stage_and_situation_has_a_table_of_all_variants(written) -> None:
     lines = text.splitlines()
     assert [lines.count(line) for line in (whole, believed, unlooked)] == [2, 2, 2]
     assert f"{whole} 1.00 |" in lines, "all together, with the time of a registration"
-    assert "2 tests, 4 frames." in lines
+    assert "Tests: 2, frames: 4." in lines
 
 
 def test_the_fill_is_told_in_words(written) -> None:

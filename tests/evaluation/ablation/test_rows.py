@@ -68,7 +68,17 @@ def test_the_same_is_the_same_to_the_last_bit() -> None:
     rows = rows_of(done([PATELLA], whole, without_contour=other))
     assert 0.2 + 1e-16 + 2**-54 != 0.2
     assert rows["patella", "without contour"].n_same == 1, "only the time differs"
+    assert rows["patella", "without contour"].n_alike == 3
     assert rows["patella", WHOLE].n_same == rows["patella", "without judge"].n_same == 3
+
+
+def test_alike_is_the_same_status_and_nearly_the_same_error() -> None:
+    whole = followed(score(0.1), score(0.2), score(0.3), LOST, LOST, DOUBTED)
+    other = followed(
+        score(0.1009), score(0.2011), score(0.3, "LOST"), LOST, score(0.1, "LOST"), LOST
+    )
+    row = rows_of(done([PATELLA], whole, without_contour=other))["patella", "without contour"]
+    assert (row.n_alike, row.n_same) == (2, 1)
 
 
 def test_times_are_of_frames_in_which_a_bone_was_followed_in_their_own_pass() -> None:
