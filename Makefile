@@ -34,7 +34,7 @@ SYSTEM_DEPS := python3-venv libgl1 libegl1 libgomp1 libusb-1.0-0 tmux \
     xvfb xserver-xorg-core xserver-xorg-video-dummy x11-xserver-utils \
     libxcb-randr0 libxcb-render0 libxcb-shm0 libxcb-xfixes0
 
-.PHONY: run tutorial window test test-all check setup bench bench-peers system-deps clean help
+.PHONY: run tutorial window test test-all check setup bench peers bench-peers system-deps clean help
 
 help:           ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/'
@@ -114,11 +114,13 @@ bench: setup    ## accuracy on recorded operations (data in NAVAPP_DATA)
 	@$(BIN)/python -m tests.bench.recorded_accuracy
 
 # The peers' wheel excludes the plain OpenCV: it has an environment of its own.
-bench-peers: setup  ## stereo beside OpenCV's contributed filters, registration beside Open3D, GICP
+peers:          ## .venv-peers: other people's trackers, for `navapp evaluate --peers`
 	@test -x $(PEERS)/bin/python || $(PYTHON) -m venv $(PEERS)
 	@$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check -c constraints.txt \
 	    opencv-contrib-python-headless==5.0.0.93 small_gicp==1.0.1 open3d-cpu \
 	    numpy numba scipy pydantic platformdirs fast-simplification
+
+bench-peers: setup peers  ## stereo beside OpenCV's contributed filters, registration beside Open3D, GICP
 	@$(PEERS)/bin/python -m tests.bench.stereo_speed
 	@$(PEERS)/bin/python -m tests.bench.occlusion_speed
 	@$(PEERS)/bin/python -m tests.bench.line_speed --frames 30

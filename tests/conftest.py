@@ -147,7 +147,8 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     skipped = terminalreporter.stats.get("skipped", [])
     without_data = sum("NAVAPP_DATA" in str(report.longrepr) for report in skipped)
     without_hardware = sum("--hardware" in str(report.longrepr) for report in skipped)
+    without_peers = sum("make peers" in str(report.longrepr) for report in skipped)
     terminalreporter.write_line(
         f"skipped: {len(skipped)} tests, {without_data} of them for want of recorded data, "
-        f"{without_hardware} for want of hardware"
+        f"{without_hardware} for want of hardware, {without_peers} for want of the peers"
     )

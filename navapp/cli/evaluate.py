@@ -12,11 +12,14 @@ from navapp.cli.campaign_options import (
 )
 from navapp.cli.diagnostics import Diagnostics
 from navapp.cli.evaluate_ablation import add_ablation_options, run_ablation
+from navapp.cli.evaluate_peers import add_peers_option, prepare_peers, run_peers, say_peers
 from navapp.cli.evaluate_recording import add_options, check_no_recording, run_recording
 from navapp.cli.evaluate_stress import add_stress_options, check_no_stress, run_stress
 from navapp.errors import UsageError
 
 if TYPE_CHECKING:
+    from navapp.evaluation.campaign import CampaignFolder
+    from navapp.evaluation.paper.cases import CaseTest
     from navapp.evaluation.paper.settings import TableSettings
 
 _EXAMPLE = """\
@@ -24,6 +27,7 @@ examples:
   navapp evaluate --quick --out look/            every case, one test of 5 frames: some minutes
   navapp evaluate --out tables/                  all of it: about two hours on two cores
   navapp evaluate --stages opening --methods bimcc --tests 2 --out opening/
+  navapp evaluate --peers --out tables/          other people's trackers beside them
   navapp evaluate --stress --out stress/         one thing at a time made worse: hours
   navapp evaluate --ablation --out parts/        bimcc without one of its parts at a time
   navapp evaluate --recording pairs/ --rig rig.yml --plan P --truth truth.json --out study/
@@ -66,6 +70,7 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--processes", type=int, metavar="N", help="at a time (the computer's cores, at most 4)"
     )
+    add_peers_option(parser)
     add_stress_options(parser)
     add_ablation_options(parser)
     add_options(parser)
@@ -77,6 +82,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     """Do it; the exit code."""
     from navapp.evaluation.paper.results import write_results
 
+    prepare_peers(options)
     if options.recording is not None:
         return _run_recording(options, diagnostics)
     check_no_recording(options)
@@ -86,14 +92,16 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     if options.ablation:
         return run_ablation(options, diagnostics)
     settings = _read_settings(options)
-    content = run_and_write(
-        settings,
-        lambda folder: write_results(folder, settings),
-        "evaluate.json",
-        options,
-        diagnostics,
-    )
+
+    def write(folder: "CampaignFolder[CaseTest]") -> dict[str, Any]:
+        if options.peers:
+            run_peers(folder.path, settings.tests, diagnostics)
+        return write_results(folder, settings)
+
+    content = run_and_write(settings, write, "evaluate.json", options, diagnostics)
     if options.json != "-":
+        if options.peers:
+            say_peers(content["peers"], diagnostics)
         _say(content["summary"], options.out, diagnostics)
     return 0
 

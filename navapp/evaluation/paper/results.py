@@ -17,6 +17,9 @@ from navapp.evaluation.paper.rows import Row, make_row
 from navapp.evaluation.paper.settings import TableSettings
 from navapp.evaluation.paper.summary import Judged, compare_with_paper, judge_method
 from navapp.evaluation.paper.tables import make_tables
+from navapp.evaluation.peers.rows import make_peer_rows
+from navapp.evaluation.peers.scores import read_peers
+from navapp.evaluation.peers.tables import format_peers, make_peer_csv
 from navapp.evaluation.scores import LEVELS, FrameScore
 from navapp.geometry.whole_files import write_whole
 
@@ -29,7 +32,10 @@ _BUDGET_COLUMNS = ("limit_mm", "ideal_mm", "matched_mm", "reached_mm")
 
 
 def write_results(folder: CampaignFolder[CaseTest], settings: TableSettings) -> dict[str, Any]:
-    """Write `tables.md`, `report.html` and `frames.csv` of what is done; the rows for programs."""
+    """Write `tables.md`, `report.html` and `frames.csv` of what is done; the rows for programs.
+
+    Where other people's trackers were run: their rows too, and `peers.csv`.
+    """
     done = list(folder.read(is_timed=False))
     timed = done if settings.is_quick else list(folder.read(is_timed=True))
     rows = [
@@ -40,11 +46,13 @@ def write_results(folder: CampaignFolder[CaseTest], settings: TableSettings) -> 
     ]
     judged = [judge_method(method, done) for method in settings.methods]
     findings = _examine(done)
+    peers = read_peers(folder.path, settings.tests)
+    peer_rows = make_peer_rows(peers, done, timed)
     tables = make_tables(
         rows,
         judged,
         _about(settings, done),
-        findings.to_lines(),
+        [*findings.to_lines(), *format_peers(peer_rows)],
         is_quick=settings.is_quick,
     )
     write_whole(folder.path / "tables.md", tables.encode())
@@ -52,8 +60,11 @@ def write_results(folder: CampaignFolder[CaseTest], settings: TableSettings) -> 
     report = make_report(tables, rows, pictures, findings.draw())
     write_whole(folder.path / "report.html", report.encode())
     write_whole(folder.path / "frames.csv", _make_csv(done).encode())
+    if peers:
+        write_whole(folder.path / "peers.csv", make_peer_csv(peers).encode())
     return {
         "rows": [row.to_json() for row in rows],
+        "peers": [row.to_json() for row in peer_rows],
         "summary": _summarise(rows, judged, settings, done) | findings.to_json(),
     }
 

@@ -1,11 +1,13 @@
 """What is run for the paper's tables."""
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, cast
 
 from navapp import __version__
 from navapp.evaluation.following import Answers, follow
 from navapp.evaluation.paper.cases import (
+    ALL_CASES,
     SITUATIONS,
     SWEEP_FRAMES,
     Case,
@@ -37,6 +39,23 @@ class TableSettings:
             **{key: value for key, value in asdict(self).items() if key != "cases"},
             "methods": list(self.methods),
         }
+
+    @classmethod
+    def from_json(cls, content: Mapping[str, Any]) -> "TableSettings":
+        """Of such an object.
+
+        Raises:
+            KeyError, TypeError: it is none.
+        """
+        by_name = {case.name: case for case in ALL_CASES}
+        return cls(
+            tuple(by_name[name] for name in content["cases"]),
+            tuple(content["methods"]),
+            content["n_tests"],
+            content["n_frames"],
+            content["first_seed"],
+            content["is_quick"],
+        )
 
     @property
     def tests(self) -> tuple[CaseTest, ...]:

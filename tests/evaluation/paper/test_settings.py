@@ -1,5 +1,6 @@
 """What is run for the paper's tables."""
 
+import json
 from dataclasses import replace
 
 from navapp.evaluation.paper.cases import FIRST_SEED, INSTRUMENT_S, SWEEP_FRAMES, Case, CaseTest
@@ -7,6 +8,11 @@ from navapp.evaluation.paper.settings import TableSettings
 
 STILL, SWEPT = Case("man", "opening", "registration"), Case("man", "opening", "instrument")
 SETTINGS = TableSettings((STILL, SWEPT), ("bimcc",), 1, 40, FIRST_SEED)
+
+
+def test_settings_are_read_as_they_were_written() -> None:
+    for one in (SETTINGS, replace(SETTINGS, methods=("icp", "bimcc"), is_quick=True, n_tests=3)):
+        assert TableSettings.from_json(json.loads(json.dumps(one.to_json()))) == one
 
 
 def test_an_instrument_passes_once_whatever_is_asked() -> None:

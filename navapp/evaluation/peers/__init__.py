@@ -1,0 +1,1 @@
+"""Other people's trackers on the frames of the paper's tables."""

@@ -1,0 +1,100 @@
+"""A row of the peers' table: what a tracker reached in a stage and situation, over all samples."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from navapp.evaluation.campaign import Done
+from navapp.evaluation.paper.cases import SITUATIONS, STAGE_NAMES, CaseTest, SituationName
+from navapp.evaluation.paper.rows import WRONG_MM
+from navapp.evaluation.peers.scores import PeerFrame, PeerTest
+
+_OK, _ALL = "bimcc, OK frames", "bimcc, every pose"
+
+# Frames of a test by the name of the tracker.
+_Frames = Mapping[str, tuple[PeerFrame, ...]]
+
+
+@dataclass(frozen=True, slots=True)
+class PeerRow:
+    """Of one stage, situation and tracker."""
+
+    stage: str
+    situation: SituationName
+    tracker: str
+    n_tests: int
+    n_frames: int  # that count
+    tre_median_mm: float | None  # over frames with a pose; None without any
+    tre_p95_mm: float | None
+    n_within: int  # frames with a pose that is at most `WRONG_MM` off
+    n_no_pose: int
+    p50_ms: float | None  # None: no time was taken
+
+    def to_json(self) -> dict[str, Any]:
+        """Named values."""
+        return asdict(self)
+
+
+def make_peer_rows(
+    peers: Sequence[PeerTest], done: Sequence[Done[CaseTest]], timed: Sequence[Done[CaseTest]]
+) -> list[PeerRow]:
+    """Pool the tests of each stage and situation; ours are those of the same tests.
+
+    Args:
+        peers: tests that the peers have done.
+        done: tests that our methods have done.
+        timed: tests of the pass in which our times were taken.
+    """
+    ours = {one.test: _take_ours(one) for one in done}
+    our_times = {one.test: _take_ours(one) for one in timed}
+    rows = []
+    for stage, situation in product(STAGE_NAMES, SITUATIONS):
+        case = (stage, situation)
+        shown = [one for one in peers if (one.test.case.stage, one.test.case.situation) == case]
+        frames = [{**ours.get(one.test, {}), **one.frames} for one in shown]
+        times = [{**our_times.get(one.test, {}), **one.frames} for one in shown]
+        names = dict.fromkeys(name for one in frames for name in one)
+        rows += [_pool(case, name, _of(name, frames), _of(name, times)) for name in names]
+    return rows
+
+
+def _of(name: str, tests: Sequence[_Frames]) -> list[tuple[PeerFrame, ...]]:
+    return [one[name] for one in tests if name in one]
+
+
+def _take_ours(done: Done[CaseTest]) -> dict[str, tuple[PeerFrame, ...]]:
+    """Ours twice: as shown, only where the judge says OK, and every pose."""
+    followed = done.followed.get("bimcc")
+    if followed is None:
+        return {}
+    shown = tuple(
+        PeerFrame(one.index, one.tre_mm if one.is_ok else None, one.total_ms)
+        for one in followed.frames
+    )
+    every = tuple(PeerFrame(one.index, one.tre_mm, one.total_ms) for one in followed.frames)
+    return {_OK: shown, _ALL: every}
+
+
+def _pool(
+    case: tuple[str, SituationName],
+    name: str,
+    tests: Sequence[tuple[PeerFrame, ...]],
+    timed: Sequence[tuple[PeerFrame, ...]],
+) -> PeerRow:
+    frames = [frame for test in tests for frame in test]
+    errors_mm = [frame.tre_mm for frame in frames if frame.tre_mm is not None]
+    times_ms = [frame.ms for test in timed for frame in test if frame.ms is not None]
+    return PeerRow(
+        *case,
+        tracker=name,
+        n_tests=len(tests),
+        n_frames=len(frames),
+        tre_median_mm=float(np.median(errors_mm)) if errors_mm else None,
+        tre_p95_mm=float(np.percentile(errors_mm, 95)) if errors_mm else None,
+        n_within=sum(error_mm <= WRONG_MM for error_mm in errors_mm),
+        n_no_pose=len(frames) - len(errors_mm),
+        p50_ms=float(np.median(times_ms)) if times_ms else None,
+    )
