@@ -173,9 +173,12 @@ class Rectifier:
                 each rectified row is looked up elsewhere. Not for bilinear interpolation.
 
         Raises:
-            ValueError: pictures of another size than the rig's, a grey one beside a coloured one.
+            ValueError: pictures of another size than the rig's, a grey one beside a coloured one,
+                row shifts with bilinear interpolation.
         """
         self.check(left, right)
+        if row_shifts_px is not None and self.interpolation == "bilinear":
+            raise ValueError("bilinear interpolation knows no shifts of rows")
         whole = Box(0, 0, self.rig.width, self.rig.height)
         inside = whole if box is None else box.clip(whole.width, whole.height)
         in_left, in_right = whole, whole

@@ -203,7 +203,7 @@ RULES = (
          lambda e: e.size_excess_mm, 0, None, CHOSEN),
     Rule(Reason.POSE_UNCERTAIN, "95 % bound by what is seen, over 0.5 mm and the plan's, mm",
          lambda e: e.seen_excess_mm, 0, None, CHOSEN),
-    Rule(Reason.MOVED_UNEVENLY, "what motion between rows and eyes may cost, mm",
+    Rule(Reason.MOTION_UNKNOWN, "what motion between rows and eyes may cost, mm",
          lambda e: e.motion_mm, OK_ERROR_MM, None, CHOSEN),
     Rule(Reason.CARTILAGE_UNCERTAIN, "rms deviation of the cartilage, mm",
          lambda e: e.cartilage_sd_mm, 0.45, None,

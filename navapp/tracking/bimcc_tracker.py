@@ -81,13 +81,7 @@ class BimccTracker(Tracker):
             # Rectify its box and depth band; the model's projection is the box of section 3.2.1.
             frame = self.begin(left, right, left_from_bone, watch, NEAR_VIEW, times)
             best = self._follow(frame, state, goal, frame.start)
-            # Once more where the rows of the pictures were exposed during another motion.
-            pose = best.left_from_bone
-            if times is not None and pose is not None:
-                times = times.correct(self.rectify_pose(pose)) or times
-                if times is not frame.times:
-                    again = self.begin(left, right, pose, watch, NEAR_VIEW, times)
-                    best = self._follow(again, state, goal, frame.start)
+            best = self._follow_closer(left, right, frame, best, state, goal)
         if best is None or best.verdict.status is Status.LOST:
             state = replace(state, box=self.boxes.follow(state.box, left))
             # Search where the box lies, and where the bone was expected.
@@ -100,6 +94,27 @@ class BimccTracker(Tracker):
             best = best.with_cause(self.find_cause(left, right, left_from_bone, state, best))
         # Update the motion, and the box.
         return self.update(best, state, left, captured_ns, watch)
+
+    def _follow_closer(
+        self,
+        left: Image,
+        right: Image,
+        frame: Frame,
+        answer: TrackedFrame,
+        state: TrackState,
+        goal: Goal,
+    ) -> TrackedFrame:
+        """Once more where the rows were exposed during another motion than was expected."""
+        pose, verdict = answer.left_from_bone, answer.verdict
+        is_doubted = is_place_doubted(verdict) or Reason.JUMPED in verdict.reasons
+        if frame.times is None or pose is None or is_doubted:
+            return answer
+        times = frame.times.with_motion_to(self.rectify_pose(pose))
+        if times is None:
+            return answer
+        again = self.begin(left, right, pose, frame.watch, NEAR_VIEW, times)
+        closer = self._follow(again, state, goal, frame.start)
+        return closer if closer.verdict.rank <= verdict.rank else answer
 
     def _follow(
         self, frame: Frame, state: TrackState, goal: Goal, predicted: RigidTransform

@@ -1,6 +1,6 @@
 """Where the bone will be: constant velocity, damped, forgotten after a loss."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -11,6 +11,8 @@ from navapp.values import Reason, Status, TrackedFrame
 
 # All chosen. A patient's limb slows down: the prediction takes this part of the last velocity.
 _DAMPING = 0.7
+# What is left of an older change of the velocity, frame by frame.
+_FADING = 0.8
 # A gap longer than this says nothing about the velocity any more.
 _MAX_GAP_NS = 400_000_000
 # A search for a buried bone takes as long as many frames. While it finds nothing it is made again
@@ -24,21 +26,26 @@ class TrackState:
 
     left_from_bone: RigidTransform  # pose of the newest frame that was not lost
     captured_ns: int  # when that was
-    velocity: FloatArray  # (6,) twist per second (mm/s, rad/s), left, about the model's centre
+    # (6,) twist per second (mm/s, rad/s), left, about the model's centre; None: not known.
+    velocity: FloatArray | None
     n_lost: int = 0  # frames lost since then
     # consecutive frames in doubt; a lost frame leaves the count alone, a glance or a frame in which
     # a search could gain nothing sets it to 0
     n_doubted: int = 0
     # of the bone in the newest picture, and what it looks like; None before the first.
     box: BoxState | None = None
+    # where something that it goes with has carried it by now, left camera from bone.
+    expected: RigidTransform | None = None
+    # (6,) by how much the velocity has changed from frame to frame of late; it fades.
+    velocity_change: FloatArray = field(default_factory=lambda: np.zeros(6))
     cause: Reason | None = None  # what was found to be wrong for good, until a frame is OK
 
     @classmethod
     def at_rest(
         cls, left_from_bone: RigidTransform, captured_ns: int, cause: Reason | None = None
     ) -> "TrackState":
-        """A pose without motion, and what is wrong for good with what was found there."""
-        return cls(left_from_bone, captured_ns, np.zeros(6), cause=cause)
+        """A pose of whose motion nothing is known, and what is wrong for good with it."""
+        return cls(left_from_bone, captured_ns, None, cause=cause)
 
     @property
     def is_search_due(self) -> bool:
@@ -48,16 +55,30 @@ class TrackState:
 
     def predict(self, captured_ns: int, centre_mm: FloatArray) -> RigidTransform:
         """The pose expected at a moment; where it was last seen after a long gap."""
+        if self.expected is not None:
+            return self.expected
         elapsed_ns = captured_ns - self.captured_ns
-        if elapsed_ns > _MAX_GAP_NS:
+        if self.velocity is None or elapsed_ns > _MAX_GAP_NS:
             return self.left_from_bone
         seconds = elapsed_ns / 1e9
         twist = _DAMPING * seconds * self.velocity
         return self.left_from_bone.move(twist, self.left_from_bone.apply(centre_mm))
 
     def carry(self, moved: RigidTransform) -> "TrackState":
-        """As if it had moved with something else, whose motion is given in the left camera."""
-        return replace(self, left_from_bone=moved @ self.left_from_bone, velocity=np.zeros(6))
+        """Expected to have moved with something else, whose motion is given in the left camera."""
+        return replace(self, expected=moved @ self.left_from_bone)
+
+    def is_recent(self, captured_ns: int) -> bool:
+        """Whether the bone was seen so shortly before a moment that its way tells its velocity."""
+        return self.n_lost == 0 and 0 < captured_ns - self.captured_ns <= _MAX_GAP_NS
+
+    def find_velocity(self, captured_ns: int, centre_mm: FloatArray) -> FloatArray | None:
+        """(6,) as of `velocity`, with which it has moved until a moment; None: not known."""
+        if not self.is_recent(captured_ns):
+            return None
+        if self.expected is None:
+            return self.velocity
+        return self._velocity_to(self.expected, captured_ns, centre_mm)
 
     def update(
         self,
@@ -77,14 +98,35 @@ class TrackState:
         is_another_thing = Reason.JUMPED in verdict.reasons and is_place_doubted(verdict)
         is_refused = verdict.status is Status.LOST or is_another_thing
         if pose is None or (is_refused and not follows_refused):
-            lost = replace(self, velocity=np.zeros(6), n_lost=self.n_lost + 1)
-            return replace(lost, cause=verdict.cause)
-        elapsed_ns = captured_ns - self.captured_ns
-        velocity = np.zeros(6)
-        if 0 < elapsed_ns <= _MAX_GAP_NS and self.n_lost == 0:
-            velocity = self.left_from_bone.twist_to(pose, centre_mm) / (elapsed_ns / 1e9)
-        n_doubted = self.n_doubted + 1 if is_worth_a_search(tracked) else 0
-        return TrackState(pose, captured_ns, velocity, 0, n_doubted, self.box, verdict.cause)
+            place = self.left_from_bone if self.expected is None else self.expected
+            lost = replace(self, left_from_bone=place, velocity=None, expected=None)
+            return replace(lost, n_lost=self.n_lost + 1, cause=verdict.cause)
+        velocity = None
+        if self.is_recent(captured_ns) and Reason.JUMPED not in verdict.reasons:
+            velocity = self._velocity_to(pose, captured_ns, centre_mm)
+        return TrackState(
+            pose,
+            captured_ns,
+            velocity,
+            n_doubted=self.n_doubted + 1 if is_worth_a_search(tracked) else 0,
+            box=self.box,
+            velocity_change=self._change_to(velocity),
+            cause=verdict.cause,
+        )
+
+    def _velocity_to(
+        self, pose: RigidTransform, captured_ns: int, centre_mm: FloatArray
+    ) -> FloatArray:
+        """(6,) mean since it was seen last."""
+        elapsed_s = (captured_ns - self.captured_ns) / 1e9
+        return self.left_from_bone.twist_to(pose, centre_mm) / elapsed_s
+
+    def _change_to(self, velocity: FloatArray | None) -> FloatArray:
+        """(6,) `velocity_change` with one more frame; of a first velocity all of it."""
+        if velocity is None:
+            return np.zeros(6)
+        before = np.zeros(6) if self.velocity is None else self.velocity
+        return np.maximum(np.abs(velocity - before), _FADING * self.velocity_change)
 
 
 def is_worth_a_search(tracked: TrackedFrame) -> bool:

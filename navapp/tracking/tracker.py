@@ -53,7 +53,7 @@ class Tracker(ABC):
     """Finds and follows one bone under one rig.
 
     `register`, `track`, `glance` and `assess` are what the controller asks for; the other methods
-    are what trackers share. `left` and `right` are pictures of the same instant. What is remembered
+    are what trackers share. `left` and `right` are a pair. What is remembered
     travels in a `TrackState`: a tracker keeps nothing of a frame.
 
     Attributes:

@@ -27,7 +27,7 @@ class Reason(Enum):
     CUES_DISAGREE = "surface and outline do not agree"
     DEGENERATE = "the seen surface leaves a direction free"
     POSE_UNCERTAIN = "the seen surface fixes the pose too loosely"
-    MOVED_UNEVENLY = "the bone changed its speed while the pictures were taken"
+    MOTION_UNKNOWN = "how the bone moved while the pictures were taken is not known"
     CARTILAGE_UNCERTAIN = "the plan knows the cartilage too roughly"
     TRE_TOO_LARGE = "the predicted error exceeds the stage's tolerance"
     JUMPED = "the pose jumped further than a patient moves"
@@ -83,7 +83,7 @@ _REMEDIES = {
     Reason.CUES_DISAGREE: "check that this is the right bone and plan; register again",
     Reason.DEGENERATE: "expose more of the bone",
     Reason.POSE_UNCERTAIN: "move the instrument or hand away, or expose more of the bone",
-    Reason.MOVED_UNEVENLY: "hold still; cameras that expose all rows at once do not need it",
+    Reason.MOTION_UNKNOWN: "hold still; cameras that expose all rows at once do not need it",
     Reason.CARTILAGE_UNCERTAIN: "give the plan a surface of the cartilage",
     Reason.TRE_TOO_LARGE: "expose more of the bone, or come closer",
     Reason.JUMPED: "wait for the next frames, or register again",

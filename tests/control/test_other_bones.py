@@ -137,7 +137,8 @@ def expected_x_mm(bench: Bench, *moves_mm: float, active: Status = Status.OK) ->
         bench.script.tracked_of["tibia"] = answer(active, pose=pose)
         bench.frames(2)
     said = [track for track in bench.script.tracks[first:] if track[0] == "femur"]
-    return [state.left_from_bone.translation_mm[0] for _, state, _ in said]
+    places = [state.expected or state.left_from_bone for _, state, _ in said]
+    return [place.translation_mm[0] for place in places]
 
 
 def test_an_other_is_expected_to_have_gone_with_the_active_bone(bench: Bench) -> None:

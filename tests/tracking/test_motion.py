@@ -77,7 +77,7 @@ def test_a_loss_keeps_the_pose_and_forgets_the_velocity(lost: TrackedFrame) -> N
     state = moving.update(lost, 2 * PERIOD_NS, CENTRE).update(lost, 3 * PERIOD_NS, CENTRE)
     assert state.n_lost == 2
     assert state.left_from_bone is moving.left_from_bone
-    assert not state.velocity.any()
+    assert state.velocity is None
 
 
 def test_a_refused_pose_is_followed_only_when_that_is_asked_for() -> None:
@@ -102,7 +102,7 @@ def test_the_first_pose_after_a_loss_gives_no_velocity() -> None:
     state = TrackState.at_rest(START, 0).update(frame(None, Status.LOST), PERIOD_NS, CENTRE)
     state = state.update(frame(moved(START, STEP)), 2 * PERIOD_NS, CENTRE)
     assert state.n_lost == 0
-    assert not state.velocity.any()
+    assert state.velocity is None
     assert state.captured_ns == 2 * PERIOD_NS
 
 
@@ -110,7 +110,7 @@ def test_the_first_pose_after_a_loss_gives_no_velocity() -> None:
 def test_a_gap_that_is_too_long_or_none_gives_no_velocity(elapsed_ns: int) -> None:
     state = TrackState.at_rest(START, 10**9)
     state = state.update(frame(moved(START, STEP)), 10**9 + elapsed_ns, CENTRE)
-    assert not state.velocity.any()
+    assert state.velocity is None
 
 
 def test_an_old_velocity_says_nothing_after_a_long_silence() -> None:
@@ -222,3 +222,30 @@ def test_a_lost_frame_neither_counts_as_a_doubt_nor_ends_a_row_of_them() -> None
     lost = state.update(frame(START, Status.LOST), 3 * PERIOD_NS, CENTRE)
     assert (lost.n_doubted, lost.n_lost) == (3, 1)
     assert lost.update(doubtful(START), 4 * PERIOD_NS, CENTRE).n_doubted == 4
+
+
+def test_what_was_carried_is_expected_there_and_its_velocity_is_known() -> None:
+    state = TrackState.at_rest(START, 0)
+    carried = state.carry(RigidTransform.from_parts("left", "left", np.eye(3), [3.0, 0.0, 0.0]))
+    np.testing.assert_allclose(
+        carried.predict(PERIOD_NS, CENTRE).translation_mm, START.translation_mm + [3.0, 0.0, 0.0]
+    )
+    velocity = carried.find_velocity(PERIOD_NS, CENTRE)
+    np.testing.assert_allclose(velocity[:3] * PERIOD_NS / 1e9, [3.0, 0.0, 0.0], atol=1e-9)
+    assert state.find_velocity(PERIOD_NS, CENTRE) is None
+
+
+def test_a_jump_tells_no_velocity() -> None:
+    jumped = replace(
+        frame(moved(START, STEP)), verdict=Verdict(Status.DEGRADED, None, (Reason.JUMPED,))
+    )
+    assert TrackState.at_rest(START, 0).update(jumped, PERIOD_NS, CENTRE).velocity is None
+
+
+def test_a_change_of_velocity_is_remembered_and_fades() -> None:
+    state, pose = TrackState.at_rest(START, 0), START
+    for number, twist in enumerate([0.0 * STEP, STEP, STEP, STEP], start=1):
+        pose = moved(pose, twist)
+        state = state.update(frame(pose), number * PERIOD_NS, CENTRE)
+    expected = 0.8**2 * np.abs(STEP) / (PERIOD_NS / 1e9)
+    np.testing.assert_allclose(state.velocity_change, expected, rtol=0.05)
