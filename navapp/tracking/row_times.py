@@ -187,7 +187,8 @@ class _Line:
     def spread(self, of_ends: FloatArray, rows: FloatArray) -> FloatArray:
         """(N, k) values in rows (N,), of those (2, k) at both ends: all but linear in the row."""
         share = ((rows - self.rows[0]) / np.ptp(self.rows))[:, None]
-        return (1.0 - share) * of_ends[0] + share * of_ends[1]
+        values: FloatArray = (1.0 - share) * of_ends[0] + share * of_ends[1]
+        return values
 
     def rows_of(self, points_mm: FloatArray) -> FloatArray:
         """(N,) rectified rows of points (N, 3)."""

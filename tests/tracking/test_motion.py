@@ -228,7 +228,8 @@ def test_what_was_carried_is_expected_there_and_its_velocity_is_known() -> None:
     state = TrackState.at_rest(START, 0)
     carried = state.carry(RigidTransform.from_parts("left", "left", np.eye(3), [3.0, 0.0, 0.0]))
     np.testing.assert_allclose(
-        carried.predict(PERIOD_NS, CENTRE).translation_mm, START.translation_mm + [3.0, 0.0, 0.0]
+        carried.predict(PERIOD_NS, CENTRE).translation_mm,
+        START.translation_mm + np.array([3.0, 0.0, 0.0]),
     )
     velocity = carried.find_velocity(PERIOD_NS, CENTRE)
     np.testing.assert_allclose(velocity[:3] * PERIOD_NS / 1e9, [3.0, 0.0, 0.0], atol=1e-9)
