@@ -68,13 +68,17 @@ def draw_variants(rows: Sequence[VariantRow]) -> str:
 
     def draw(figure: Any) -> None:
         errors, shares, times = figure.subplots(1, 3, sharey=True)
-        for shift, label, values, colour in (
-            (-0.2, "OK, mean", [row.tre_ok_mm for row in rows], BLUE),
-            (0.2, "all poses, mean", [row.tre_any_mm for row in rows], ORANGE),
+        for label, values, marker, colour in (
+            ("OK, mean", [row.tre_ok_mm for row in rows], "o", BLUE),
+            ("OK, worst", [row.worst_ok_mm for row in rows], "x", BLUE),
+            ("all, mean", [row.tre_any_mm for row in rows], "s", ORANGE),
         ):
-            widths = [value or 0.0 for value in values]
-            errors.barh([k + shift for k in places], widths, 0.36, color=colour, label=label)
-        errors.set(xlabel="TRE, mm")
+            known = [(v, k) for k, v in enumerate(values) if v is not None]
+            if known:
+                errors.plot(*zip(*known, strict=True), marker, color=colour, ms=5, label=label)
+        # Without the judge errors are a thousand times as large.
+        errors.set(xlabel="TRE, mm", xscale="log")
+        errors.grid(axis="x", alpha=0.3)
         for shift, label, counts, colour in (
             (-0.2, "OK", [row.n_ok for row in rows], BLUE),
             (0.2, "OK and wrong", [row.n_wrong for row in rows], ORANGE),
@@ -88,7 +92,7 @@ def draw_variants(rows: Sequence[VariantRow]) -> str:
         errors.invert_yaxis()
         for axes in (errors, shares):
             axes.legend(frameon=False, fontsize=7, loc="upper center", bbox_to_anchor=(0.5, 1.2),
-                        ncols=2)  # fmt: skip
+                        ncols=3)  # fmt: skip
 
     return draw_svg(draw, (9.6, 3.4))
 
