@@ -34,7 +34,7 @@ SYSTEM_DEPS := python3-venv libgl1 libegl1 libgomp1 libusb-1.0-0 tmux \
     xvfb xserver-xorg-core xserver-xorg-video-dummy x11-xserver-utils \
     libxcb-randr0 libxcb-render0 libxcb-shm0 libxcb-xfixes0
 
-.PHONY: run tutorial window test test-all check setup bench peers bench-peers system-deps clean help
+.PHONY: run tutorial window test test-all check setup bench peers peers-visp bench-peers system-deps clean help
 
 help:           ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/'
@@ -119,6 +119,11 @@ peers:          ## .venv-peers: other people's trackers, for `navapp evaluate --
 	@$(PEERS)/bin/python -m pip install --quiet --disable-pip-version-check -c constraints.txt \
 	    opencv-contrib-python-headless==5.0.0.93 small_gicp==1.0.1 open3d-cpu \
 	    numpy numba scipy pydantic platformdirs fast-simplification
+
+peers-visp: peers  ## another one: ViSP's tracker (Debian's libvisp-dev)
+	@pkg-config --exists visp || { echo "ViSP is missing: apt-get install libvisp-dev"; exit 1; }
+	g++ -O2 -std=c++17 tests/bench/visp/surface_tracker.cpp -o $(PEERS)/bin/visp_surface_tracker \
+	    $$(pkg-config --cflags visp) -lvisp_mbt -lvisp_klt -lvisp_core
 
 bench-peers: setup peers  ## stereo beside OpenCV's contributed filters, registration beside Open3D, GICP
 	@$(PEERS)/bin/python -m tests.bench.stereo_speed

@@ -5,8 +5,9 @@ usage: .venv-peers/bin/python -m tests.bench.peer_frames FOLDER
 
 FOLDER is one of `navapp evaluate`. Its tests are rendered again from their seeds, and followed by
 every peer from the pose that our registration finds in the first frame. `peers/` gets a file a test
-as it is done, and its name is printed; started again, it goes on with what is missing. One test at
-a time, so that the times are those of one tracker. `--check` only loads what the peers need.
+as it is done. Started again, it goes on with what is missing, be it a test or a peer. The name of
+each test is printed as soon as its file is there. One test at a time, so that the times are those
+of one tracker. `--check` only loads what the peers need.
 """
 
 import json
@@ -18,7 +19,7 @@ from pathlib import Path
 from navapp.evaluation.following import follow
 from navapp.evaluation.paper.cases import CaseTest
 from navapp.evaluation.paper.settings import TableSettings
-from navapp.evaluation.peers.scores import PeerFrame, PeerTest, file_of, write_peers
+from navapp.evaluation.peers.scores import PeerFrame, PeerTest, read_peers, write_peers
 from navapp.evaluation.sequence import KnownSequence
 from navapp.evaluation.truth import compute_mean_tre_mm
 from navapp.geometry.mesh import TriangleMesh
@@ -36,13 +37,15 @@ def main(argument: str) -> None:
         return
     folder = Path(argument)
     settings = TableSettings.from_json(json.loads((folder / "settings.json").read_text()))
-    missing = [test for test in settings.tests if not file_of(folder, test).is_file()]
-    if missing:
+    kept = read_peers(folder, settings.tests)
+    done = {one.test for one in kept if peers.keys() <= one.frames.keys()}
+    if len(done) < len(settings.tests):
         # What is compiled or loaded at first use belongs to no test's times.
-        follow_with_all(missing[0], settings.render(missing[0], 2), peers)
-    for test in missing:
-        sequence = settings.render(test, settings.count_frames(test))
-        write_peers(folder, follow_with_all(test, sequence, peers))
+        follow_with_all(settings.tests[0], settings.render(settings.tests[0], 2), peers)
+    for test in settings.tests:
+        if test not in done:
+            sequence = settings.render(test, settings.count_frames(test))
+            write_peers(folder, follow_with_all(test, sequence, peers))
         print(test.name, flush=True)
 
 
@@ -69,7 +72,7 @@ def score(
 ) -> tuple[PeerFrame, ...]:
     """Of all frames but the first one; without a pose before the bone was found."""
     start, first, surface = begun or (len(sequence.frames), None, None)
-    tracker = None if first is None else peer(sequence.rig, surface, first)
+    tracker = None if first is None else peer(sequence.rig, surface, sequence.frames[start], first)
     scores = []
     for place in range(1, len(sequence.frames)):
         if tracker is None or place < start:

@@ -1,12 +1,13 @@
 """Other people's trackers, each wrapped so that it follows a bone from pair to pair.
 
-A peer gets the rig, the surface of the bone that is left and its first pose, and then one pair
-after the other. It has no registration, no judge and no truth; without a pose in a pair it goes on
-from the last one that it had.
+A peer gets the rig, the surface of the bone that is left and the pose in the first pair, and then
+one pair after the other. It has no registration, no judge and no truth; without a pose in a pair it
+goes on from the last one that it had.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import cv2
@@ -19,10 +20,12 @@ from navapp.geometry.rig import StereoRig
 from navapp.geometry.simplify import drawn
 from navapp.geometry.transform import FloatArray, RigidTransform
 from tests.bench.peer_stereo import StereoSettings, find_points_mm
+from tests.bench.peer_visp import PROGRAM, VispTracker
 
 # A pair to the pose of the bone in the left camera; None: it has none.
 Follow = Callable[[StereoFrame], RigidTransform | None]
-Peer = Callable[[StereoRig, TriangleMesh, RigidTransform], Follow]
+# Rig, surface of the bone, first pair and the pose in it.
+Peer = Callable[[StereoRig, TriangleMesh, StereoFrame, RigidTransform], Follow]
 # Points of the scene in the bone, where it was, to the motion that takes them onto its surface.
 _Fit = Callable[[FloatArray], FloatArray]
 
@@ -97,7 +100,9 @@ def make_gicp(stereo: StereoSettings, icp: IcpSettings) -> Peer:
 
 
 def _make_icp(stereo: StereoSettings, prepare: Callable[[TriangleMesh], _Fit]) -> Peer:
-    def begin(rig: StereoRig, surface: TriangleMesh, first: RigidTransform) -> Follow:
+    def begin(
+        rig: StereoRig, surface: TriangleMesh, _: StereoFrame, first: RigidTransform
+    ) -> Follow:
         rectifier, fit = rectifier_of(rig), prepare(surface)
         to_rectified = rectifier.geometry.rectified_from_left
         last = to_rectified @ first
@@ -136,7 +141,9 @@ def make_rapid(settings: RapidSettings) -> Peer:
     here a pose that many edges agree with is looked for (`solvePnPRansac`).
     """
 
-    def begin(rig: StereoRig, surface: TriangleMesh, first: RigidTransform) -> Follow:
+    def begin(
+        rig: StereoRig, surface: TriangleMesh, _: StereoFrame, first: RigidTransform
+    ) -> Follow:
         rectifier = rectifier_of(rig)
         geometry, outline = rectifier.geometry, Outline(rectifier.geometry, drawn(surface))
         last = geometry.rectified_from_left @ first
@@ -206,7 +213,7 @@ def make_peers() -> dict[str, Peer]:
     stereo = StereoSettings(
         window_px=5, wls_lambda=None, margin_px=16, margin_mm=30.0, n_points=3000
     )
-    return {
+    peers = {
         "SGBM + WLS + Open3D ICP": make_open3d(
             replace(stereo, wls_lambda=10.0), IcpSettings((3.0,), (0.7,))
         ),
@@ -215,3 +222,6 @@ def make_peers() -> dict[str, Peer]:
             RapidSettings(n_lines=150, reach_px=5, n_steps=3, least_response=15.0, agree_px=1.0)
         ),
     }
+    if PROGRAM.is_file():
+        peers["ViSP, KLT on the model"] = partial(VispTracker, n_faces=300)
+    return peers

@@ -42,7 +42,7 @@ def run_program(folder: Path, on_done: Callable[[str], None], root: Path = _ROOT
 
     Args:
         folder: of the evaluation.
-        on_done: told the name of each test as it is done.
+        on_done: told the name of each test as it is there.
         root: of the repository.
 
     Raises:

@@ -34,11 +34,12 @@ def folder(tmp_path_factory) -> Path:
 @pytest.mark.timeout(300)
 def test_every_peer_follows_the_bone_from_our_first_pose(folder) -> None:
     (done,) = read_peers(folder, SETTINGS.tests)
-    assert set(done.frames) == {"SGBM + WLS + Open3D ICP", "SGBM + GICP", "cv2.rapid + RANSAC"}
+    always = {"SGBM + WLS + Open3D ICP", "SGBM + GICP", "cv2.rapid + RANSAC"}
+    assert always <= set(done.frames) <= {*always, "ViSP, KLT on the model"}
     for name, frames in done.frames.items():
         assert [frame.index for frame in frames] == [1, 2, 3, 4], name
         assert all(frame.ms > 0.0 for frame in frames), name
-    for name in ("SGBM + WLS + Open3D ICP", "SGBM + GICP"):
+    for name in set(done.frames) - {"cv2.rapid + RANSAC"}:
         assert all(frame.tre_mm < 1.0 for frame in done.frames[name]), name
     # An outline alone is not enough to follow a bone for long.
     assert done.frames["cv2.rapid + RANSAC"][0].tre_mm < 10.0
@@ -50,6 +51,6 @@ def test_what_is_done_is_not_done_again(folder) -> None:
     before = path.read_bytes(), os.stat(path).st_mtime_ns
     told = []
     run_program(folder, told.append)
-    assert told == []
+    assert told == [SETTINGS.tests[0].name]
     assert (path.read_bytes(), os.stat(path).st_mtime_ns) == before
     assert json.loads(before[0])["seed"] == SETTINGS.tests[0].seed
