@@ -8,7 +8,7 @@ import pytest
 import tests.bench
 
 NAMES = sorted(path.stem for path in Path(tests.bench.__path__[0]).glob("[a-z]*.py"))
-# Installed by `make bench-peers` alone.
+# Installed by `make peers` alone.
 PEERS = {"open3d", "skimage", "pyransac3d"}
 
 

@@ -102,4 +102,7 @@ def measure(sequence: KnownSequence, place: int, pose: RigidTransform | None) ->
 if __name__ == "__main__":
     if len(sys.argv) != 2:
         sys.exit((__doc__ or "").strip())
-    main(sys.argv[1])
+    try:
+        main(sys.argv[1])
+    except KeyboardInterrupt:  # who began it has been stopped as well, and says so
+        sys.exit(130)

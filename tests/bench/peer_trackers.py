@@ -217,11 +217,11 @@ def make_peers() -> dict[str, Peer]:
         "SGBM + WLS + Open3D ICP": make_open3d(
             replace(stereo, wls_lambda=10.0), IcpSettings((3.0,), (0.7,))
         ),
-        "SGBM + GICP": make_gicp(stereo, IcpSettings((3.0, 1.0))),
+        "SGBM + GICP": make_gicp(stereo, IcpSettings((1.0,))),
         "cv2.rapid + RANSAC": make_rapid(
-            RapidSettings(n_lines=150, reach_px=5, n_steps=3, least_response=15.0, agree_px=1.0)
+            RapidSettings(n_lines=150, reach_px=5, n_steps=3, least_response=15.0, agree_px=1.5)
         ),
     }
     if PROGRAM.is_file():
-        peers["ViSP, KLT on the model"] = partial(VispTracker, n_faces=300)
+        peers["ViSP, KLT on the model"] = partial(VispTracker, n_faces=150)
     return peers

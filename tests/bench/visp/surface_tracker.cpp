@@ -37,8 +37,8 @@ bool read_pair(Picture &left, Picture &right) {
 
 vpKltOpencv make_points() {
   vpKltOpencv points;
-  points.setMaxFeatures(600);
-  points.setWindowSize(7);
+  points.setMaxFeatures(1500);
+  points.setWindowSize(11);
   points.setQuality(0.005);
   points.setMinDistance(4);
   points.setHarrisFreeParameter(0.01);
