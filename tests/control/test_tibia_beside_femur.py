@@ -165,7 +165,7 @@ def test_a_live_search_goes_on_while_frames_are_handled_and_its_pose_goes_with_t
     assert tracked is room.script.tracked_of["tibia"]
     assert room.beside.began == [0]
     assert room.taken_over == [4]
-    expected = room.script.tracks[0][1].left_from_bone.translation_mm
+    expected = room.script.tracks[0][1].expected.translation_mm
     assert expected[0] == pytest.approx(4.0 + 2.5)
 
 
