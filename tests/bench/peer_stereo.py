@@ -11,6 +11,7 @@ from navapp.geometry.box import Box
 from navapp.geometry.rectification import RectifiedPair, Rectifier
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer import bounds_of
+from tests.bench.sgbm import make_matcher
 
 _OPENCV_SCALE, _BLOCK = 16, 16
 
@@ -80,18 +81,8 @@ def _match(pair: RectifiedPair, lowest: int, count: int, settings: StereoSetting
 
 
 def _make_matcher(lowest: int, count: int, settings: StereoSettings) -> Any:
-    return cv2.StereoSGBM.create(
-        minDisparity=lowest,
-        numDisparities=count,
-        blockSize=settings.window_px,
-        P1=8 * settings.window_px**2,
-        P2=32 * settings.window_px**2,
-        disp12MaxDiff=1,
-        preFilterCap=63,
-        uniquenessRatio=settings.uniqueness_percent,
-        speckleWindowSize=settings.speckle_px,
-        speckleRange=2,
-        mode=cv2.STEREO_SGBM_MODE_SGBM_3WAY,
+    return make_matcher(
+        lowest, count, settings.window_px, settings.uniqueness_percent, settings.speckle_px
     )
 
 

@@ -1,6 +1,7 @@
 """Disparity by OpenCV's semi-global block matching, inside a box and a band."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,7 +50,6 @@ def match_sgbm(
 
     Source: Hirschmueller 2008, as in OpenCV's `StereoSGBM` (three-way).
     """
-    import cv2
 
     settings = settings or SgbmSettings()
     box = pair.box
@@ -64,18 +64,13 @@ def match_sgbm(
     left = _crop(pair.left, box.x - lead, width, box)
     right = _crop(pair.right, box.x - lead - lowest, width, box)
     channels = 1 if left.ndim == 2 else left.shape[2]
-    matcher = cv2.StereoSGBM.create(
-        minDisparity=0,
-        numDisparities=n_disparities,
-        blockSize=settings.window_px,
-        P1=8 * channels * settings.window_px**2,
-        P2=32 * channels * settings.window_px**2,
-        disp12MaxDiff=1,
-        preFilterCap=63,
-        uniquenessRatio=settings.uniqueness_percent,
-        speckleWindowSize=settings.speckle_px,
-        speckleRange=2,
-        mode=cv2.STEREO_SGBM_MODE_SGBM_3WAY,
+    matcher = make_matcher(
+        0,
+        n_disparities,
+        settings.window_px,
+        settings.uniqueness_percent,
+        settings.speckle_px,
+        channels,
     )
     raw = np.asarray(matcher.compute(left, right))[:, lead:].astype(np.float32)
     disparity = (raw / np.float32(_OPENCV_SCALE) + np.float32(lowest)).astype(np.float32)
@@ -89,6 +84,32 @@ def match_sgbm(
     is_matched &= (columns >= 0.0) & (columns <= last_column) & (rows >= 0) & (rows <= last_row)
     is_matched &= _has_contrast(left, settings)[:, lead:]
     return _map(disparity, is_matched, settings, box)
+
+
+def make_matcher(
+    lowest: int,
+    n_disparities: int,
+    window_px: int,
+    uniqueness_percent: int,
+    speckle_px: int,
+    channels: int = 1,
+) -> Any:
+    """OpenCV's three-way SGBM with the penalties that its documentation proposes."""
+    import cv2
+
+    return cv2.StereoSGBM.create(
+        minDisparity=lowest,
+        numDisparities=n_disparities,
+        blockSize=window_px,
+        P1=8 * channels * window_px**2,
+        P2=32 * channels * window_px**2,
+        disp12MaxDiff=1,
+        preFilterCap=63,
+        uniquenessRatio=uniqueness_percent,
+        speckleWindowSize=speckle_px,
+        speckleRange=2,
+        mode=cv2.STEREO_SGBM_MODE_SGBM_3WAY,
+    )
 
 
 def disparity_window(band_px: tuple[float, float]) -> tuple[int, int]:
