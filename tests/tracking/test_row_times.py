@@ -12,7 +12,7 @@ from navapp.tracking import TrackState
 from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.tracking.row_times import RowTimes
 from navapp.tracking.surface_meter import Margins, SurfaceMeter
-from navapp.values import Reason, Status
+from navapp.values import DisparityMap, Origin, Reason, Status
 from tests.tracking.rooms import GOAL, room
 
 ROW_DELAY_NS = 20_862  # 15 ms over 720 rows
@@ -32,6 +32,10 @@ def rectified():
     return a.tracker.rectify_pose(a.truth(a.frames[0]))
 
 
+def depth_mm() -> float:
+    return float(rectified().apply(room().tracker.centre_mm)[2])
+
+
 def times(velocity=VELOCITY, skew_s: float = 0.0, row_delay_ns: int = ROW_DELAY_NS) -> RowTimes:
     """Of a bone that has moved evenly by `VELOCITY` since the frame before."""
     pose = rectified()
@@ -40,22 +44,21 @@ def times(velocity=VELOCITY, skew_s: float = 0.0, row_delay_ns: int = ROW_DELAY_
     return RowTimes(meter(row_delay_ns), known, np.zeros(6), last, 0.05, skew_s)
 
 
-def test_rows_that_are_exposed_at_once_know_no_motion() -> None:
+def test_without_row_delay_and_skew_nothing_is_corrected() -> None:
     state = TrackState.at_rest(room().truth(room().frames[0]), 0)
     assert RowTimes.of_pair(meter(0), state, 66_000_000, 0) is None
     assert RowTimes.of_pair(meter(0), state, 66_000_000, 1) is not None
     assert RowTimes.of_pair(meter(), state, 66_000_000, 0) is not None
 
 
-def test_a_bone_of_unknown_motion_is_looked_up_where_it_is() -> None:
+def test_a_bone_of_unknown_velocity_is_looked_up_where_it_is() -> None:
     assert times(None).find_shifts(rectified()) is None
 
 
 def test_rows_are_looked_up_where_the_bone_was_when_they_were_exposed() -> None:
     """The shift of a row is the way in the picture until it was exposed."""
     left_px, right_px = times().find_shifts(rectified())
-    focal_px, depth_mm = room().rig.left.focal_px, rectified().apply(room().tracker.centre_mm)[2]
-    per_row_px = VELOCITY[0] * focal_px / depth_mm * ROW_DELAY_NS * 1e-9
+    per_row_px = VELOCITY[0] * room().rig.left.focal_px / depth_mm() * ROW_DELAY_NS * 1e-9
     for one in (left_px, right_px):
         steps_px = np.diff(one[:, 0])
         np.testing.assert_allclose(steps_px, steps_px[0])
@@ -66,12 +69,12 @@ def test_rows_are_looked_up_where_the_bone_was_when_they_were_exposed() -> None:
     assert np.interp(rows, np.arange(720), left_px[:, 0]).sum() == pytest.approx(0.0, abs=0.01)
 
 
-def test_a_right_eye_that_looks_later_is_moved_along() -> None:
+def test_in_a_right_picture_that_is_taken_later_the_bone_is_looked_up_further_on() -> None:
     together = times().find_shifts(rectified())
     later = times(skew_s=2e-3).find_shifts(rectified())
     np.testing.assert_array_equal(together[0], later[0])
-    way_px = VELOCITY[0] * 2e-3 * room().rig.left.focal_px / rectified().translation_mm[2]
-    assert np.mean(later[1] - together[1], axis=0)[0] == pytest.approx(way_px, rel=0.15)
+    moved_px = VELOCITY[0] * 2e-3 * room().rig.left.focal_px / depth_mm()
+    assert np.mean(later[1] - together[1], axis=0)[0] == pytest.approx(moved_px, rel=0.15)
 
 
 def test_an_even_motion_costs_what_a_shift_by_rows_leaves_of_it() -> None:
@@ -79,11 +82,11 @@ def test_an_even_motion_costs_what_a_shift_by_rows_leaves_of_it() -> None:
     assert times().with_motion_to(rectified()) is None
     assert times().error_mm(rectified()) < 0.05
     # The relief of a knee is a twentieth of its distance.
-    way_mm = VELOCITY[0] * 5e-3 * depth_mm() / room().rig.baseline_mm
-    assert 0.0 < times(skew_s=5e-3).error_mm(rectified()) < 0.1 * way_mm
+    uncorrected_mm = VELOCITY[0] * 5e-3 * depth_mm() / room().rig.baseline_mm
+    assert 0.0 < times(skew_s=5e-3).error_mm(rectified()) < 0.1 * uncorrected_mm
 
 
-def test_a_change_of_speed_costs_depth_by_the_time_between_the_eyes() -> None:
+def test_a_change_of_speed_costs_depth_in_proportion_to_the_skew() -> None:
     one = times(VELOCITY - 40.0 * ALONG_X, skew_s=5e-3, row_delay_ns=0)
     expected_mm = 40.0 * 5e-3 * depth_mm() / room().rig.baseline_mm
     assert one.error_mm(rectified()) == pytest.approx(expected_mm, rel=0.15)
@@ -117,7 +120,7 @@ def test_after_a_gap_nothing_is_known(elapsed_ns: int) -> None:
     one = RowTimes.of_pair(meter(), state, elapsed_ns, 0)
     assert one.velocity is None
     assert one.with_motion_to(rectified()) is None
-    # 200 mm/s, while the eyes are 0.2 ms apart and the rows of the bone 7 ms.
+    # 200 mm/s; both cameras see a point within 0.2 ms, and the bone's rows last 7 ms.
     assert 0.15 < one.error_mm(rectified()) < 1.0
 
 
@@ -126,8 +129,28 @@ def test_after_a_loss_nothing_is_known() -> None:
     assert RowTimes.of_pair(meter(), state, 66_000_000, 5_000_000).error_mm(rectified()) > 4.0
 
 
-def depth_mm() -> float:
-    return float(rectified().apply(room().tracker.centre_mm)[2])
+def matched_rows(first: float, last: float) -> DisparityMap:
+    """Of the bone's box only rows between these shares of its height are matched."""
+    box = meter().find_region(rectified(), Margins(0, 0.0))[0]
+    origin = np.full((box.height, box.width), Origin.UNKNOWN, np.uint8)
+    origin[round(first * box.height) : round(last * box.height)] = Origin.MATCHED
+    nothing = np.full(origin.shape, np.nan, np.float32)
+    return DisparityMap(nothing, nothing, origin, box.x, box.y)
+
+
+def test_the_pose_is_that_at_the_middle_of_the_rows_that_were_matched() -> None:
+    box = meter().find_region(rectified(), Margins(0, 0.0))[0]
+    quarter_s = 0.25 * box.height * ROW_DELAY_NS * 1e-9
+
+    def moved_mm(one: RowTimes, first: float, last: float) -> np.ndarray:
+        pose = one.move_to_seen(rectified(), matched_rows(first, last))
+        return pose.apply(room().tracker.centre_mm) - rectified().apply(room().tracker.centre_mm)
+
+    assert moved_mm(times(), 0.5, 1.0) == pytest.approx(VELOCITY[:3] * quarter_s, rel=0.05)
+    assert moved_mm(times(), 0.0, 0.5) == pytest.approx(-VELOCITY[:3] * quarter_s, rel=0.05)
+    assert np.abs(moved_mm(times(), 0.0, 1.0)).max() < 0.05 * VELOCITY[0] * quarter_s
+    assert not moved_mm(times(), 0.0, 0.0).any(), "nothing is matched"
+    assert not moved_mm(times(None), 0.5, 1.0).any(), "the velocity is not known"
 
 
 def moving_room(shutter_ms: float, skew_ms: float):
