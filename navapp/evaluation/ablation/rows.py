@@ -2,18 +2,21 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from itertools import product
+from operator import attrgetter
+from typing import Any, Final, Literal
 
 import numpy as np
 
 from navapp.evaluation.ablation.settings import VARIANTS, WHOLE
 from navapp.evaluation.campaign import Done
-from navapp.evaluation.paper.cases import SITUATIONS, STAGE_NAMES, CaseTest
+from navapp.evaluation.paper.cases import SITUATIONS, STAGE_NAMES, CaseTest, SituationName
 from navapp.evaluation.paper.rows import is_within_bound, is_wrong
-from navapp.evaluation.scores import FrameScore
+from navapp.evaluation.scores import Followed, FrameScore
 
-ALL = "all"
-# A fit that begins elsewhere within its basin ends at the same pose to far less.
+ALL: Final = "all"
+SituationOrAll = SituationName | Literal["all"]
+# Fits that begin at different places and end at the same pose differ by far less.
 ALIKE_MM = 0.001
 
 
@@ -21,8 +24,8 @@ ALIKE_MM = 0.001
 class VariantRow:
     """Of one variant; None where no frame has the figure."""
 
-    stage: str  # or `ALL`
-    situation: str  # or `ALL`
+    stage: str  # or `ALL`, then with the situation `ALL`
+    situation: SituationOrAll
     variant: str
     n_tests: int
     n_frames: int
@@ -33,12 +36,15 @@ class VariantRow:
     worst_ok_mm: float | None
     n_wrong: int  # OK, further off than 1 mm and than their bound
     coverage: float | None  # of OK frames, the share within their bound
-    n_same: int  # verdict, errors and bound are those of the whole method to the last bit
-    n_alike: int  # the status is, and the error within `ALIKE_MM`
-    # processing time of a frame in which the bone was followed, from the pass of its own.
+    # Frames compared with those of the whole method: verdict, errors and bound are the same to the
+    # last bit; the status is the same, and the error differs by at most `ALIKE_MM`.
+    n_same: int
+    n_alike: int
+    # From the timed pass: processing time of a frame in which the bone was followed, and mean time
+    # of a registration.
     median_ms: float | None
     mean_ms: float | None
-    registration_s: float | None  # mean, from that pass
+    registration_s: float | None
 
     @property
     def ok_share(self) -> float:
@@ -53,22 +59,21 @@ class VariantRow:
 def make_variant_rows(
     done: Sequence[Done[CaseTest]], timed: Sequence[Done[CaseTest]]
 ) -> list[VariantRow]:
-    """Of every stage and situation that has a test, and of all of them, every variant.
+    """Of all tests together, then of every stage and situation that has one: every variant.
 
     Args:
         done: all tests.
         timed: tests of the pass in which times were taken.
     """
     rows = [_make_row(ALL, ALL, name, done, timed) for name in VARIANTS if done]
-    for stage in STAGE_NAMES:
-        for situation in SITUATIONS:
-            some, some_timed = (_of(stage, situation, tests) for tests in (done, timed))
-            if some:
-                rows += [_make_row(stage, situation, name, some, some_timed) for name in VARIANTS]
+    for stage, situation in product(STAGE_NAMES, SITUATIONS):
+        some, some_timed = (_select(tests, stage, situation) for tests in (done, timed))
+        if some:
+            rows += [_make_row(stage, situation, name, some, some_timed) for name in VARIANTS]
     return rows
 
 
-def _of(stage: str, situation: str, done: Sequence[Done[CaseTest]]) -> list[Done[CaseTest]]:
+def _select(done: Sequence[Done[CaseTest]], stage: str, situation: str) -> list[Done[CaseTest]]:
     return [
         one for one in done if (one.test.case.stage, one.test.case.situation) == (stage, situation)
     ]
@@ -76,7 +81,7 @@ def _of(stage: str, situation: str, done: Sequence[Done[CaseTest]]) -> list[Done
 
 def _make_row(
     stage: str,
-    situation: str,
+    situation: SituationOrAll,
     variant: str,
     done: Sequence[Done[CaseTest]],
     timed: Sequence[Done[CaseTest]],
@@ -84,16 +89,7 @@ def _make_row(
     frames = [frame for one in done for frame in one.followed[variant].frames]
     whole = [frame for one in done for frame in one.followed[WHOLE].frames]
     ok = [frame for frame in frames if frame.is_ok and frame.tre_mm is not None]
-    ok_mm = [frame.tre_mm for frame in ok if frame.tre_mm is not None]
-    any_mm = [frame.tre_mm for frame in frames if frame.tre_mm is not None]
-    times_ms = [
-        frame.total_ms
-        for one in timed
-        for frame in one.followed[variant].frames
-        if not frame.is_search and (frame.tre_mm is not None or frame.reasons)
-    ]
-    registered = [one.followed[variant].registration_s for one in timed]
-    seconds = [value for value in registered if value is not None]
+    times_ms = _list_times_ms([one.followed[variant] for one in timed])
     return VariantRow(
         stage=stage,
         situation=situation,
@@ -101,36 +97,44 @@ def _make_row(
         n_tests=len(done),
         n_frames=len(frames),
         n_ok=len(ok),
-        tre_ok_mm=_mean(ok_mm),
-        tre_any_mm=_mean(any_mm),
-        worst_ok_mm=max(ok_mm, default=None),
+        tre_ok_mm=_mean([frame.tre_mm for frame in ok]),
+        tre_any_mm=_mean([frame.tre_mm for frame in frames]),
+        worst_ok_mm=max((frame.tre_mm or 0.0 for frame in ok), default=None),
         n_wrong=sum(is_wrong(frame) for frame in ok),
         coverage=_mean([is_within_bound(frame) for frame in ok]),
         n_same=sum(_is_same(*both) for both in zip(frames, whole, strict=True)),
         n_alike=sum(_is_alike(*both) for both in zip(frames, whole, strict=True)),
         median_ms=float(np.median(times_ms)) if times_ms else None,
         mean_ms=_mean(times_ms),
-        registration_s=_mean(seconds),
+        registration_s=_mean([one.followed[variant].registration_s for one in timed]),
     )
 
 
+def _list_times_ms(tests: Sequence[Followed]) -> list[float]:
+    """Of frames in which a bone was followed."""
+    return [
+        frame.total_ms
+        for test in tests
+        for frame in test.frames
+        if not frame.is_search and (frame.tre_mm is not None or frame.reasons)
+    ]
+
+
 def _is_same(one: FrameScore, other: FrameScore) -> bool:
-    """Nothing that the frame tells differs, but for the time that it took."""
-
-    def told(frame: FrameScore) -> tuple[object, ...]:
-        return (
-            frame.status, frame.reasons, frame.tre_mm, frame.displacement_mm, frame.outline_mm,
-            frame.bound_mm,
-        )  # fmt: skip
-
-    return told(one) == told(other)
+    """Verdict, errors and bound are, to the last bit."""
+    compared = attrgetter(
+        "status", "reasons", "tre_mm", "displacement_mm", "outline_mm", "bound_mm"
+    )
+    return bool(compared(one) == compared(other))
 
 
 def _is_alike(one: FrameScore, other: FrameScore) -> bool:
+    """The status is the same, and the error nearly; without a pose in either as well."""
     if one.tre_mm is None or other.tre_mm is None:
         return (one.status, one.tre_mm) == (other.status, other.tre_mm)
     return one.status == other.status and abs(one.tre_mm - other.tre_mm) <= ALIKE_MM
 
 
-def _mean(values: Sequence[float]) -> float | None:
-    return float(np.mean(values)) if values else None
+def _mean(values: Sequence[float | None]) -> float | None:
+    known = [value for value in values if value is not None]
+    return float(np.mean(known)) if known else None

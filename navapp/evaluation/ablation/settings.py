@@ -27,7 +27,7 @@ VARIANTS: dict[str, frozenset[Part]] = {
 class AblationSettings:
     """What is run; another campaign in the same folder must have the same."""
 
-    knees: TableSettings  # the cases, their tests and frames; all variants follow them
+    knees: TableSettings  # the cases, their tests and frames; every variant follows all of them
 
     @property
     def methods(self) -> tuple[str, ...]:
@@ -41,11 +41,11 @@ class AblationSettings:
 
     @property
     def timed_tests(self) -> tuple[CaseTest, ...]:
-        """As of the tables: the first of each case; none for a quick look."""
+        """As for the tables: the first of each case; none for a quick look."""
         return self.knees.timed_tests
 
     def count_frames(self, test: CaseTest) -> int:
-        """As of the tables: a test with an instrument lasts until that has passed once."""
+        """As for the tables: a test with an instrument lasts until that has passed once."""
         return self.knees.count_frames(test)
 
     def render(self, test: CaseTest, n_frames: int) -> KnownSequence:
@@ -53,7 +53,7 @@ class AblationSettings:
         return self.knees.render(test, n_frames)
 
     def follow(self, sequence: KnownSequence, method: str) -> Answers:
-        """What our method says of a sequence without the parts of a variant."""
+        """What our method says of a sequence, without the part that a variant leaves out."""
         return follow(sequence, "bimcc", VARIANTS[method])
 
     def to_json(self) -> dict[str, Any]:

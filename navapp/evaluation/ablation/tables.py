@@ -2,14 +2,15 @@
 
 from collections.abc import Sequence
 
-from navapp.evaluation.ablation.rows import ALIKE_MM, ALL, VariantRow
+from navapp.evaluation.ablation.rows import ALIKE_MM, ALL, SituationOrAll, VariantRow
 from navapp.evaluation.ablation.settings import WHOLE, WITHOUT_FILL
 from navapp.evaluation.paper.cases import SITUATIONS
+from navapp.evaluation.paper.tables import format_mm
 
 _ABOUT = (
     "`bimcc` is the method of the product; every other row leaves one part of it out, and follows "
     "the same pictures. TRE: mean over the stage's targets, of frames that are OK, and of all with "
-    "a pose whatever is said of them: where a bone is lost, these are what searches came upon. OK "
+    "a pose, refused ones too: where a bone is lost, these are poses that a search came upon. OK "
     "and wrong: OK, more than 1 mm off and more than the predicted bound. Within: share of OK "
     "frames within their bound. Alike: share of frames whose status is that of `bimcc`, and whose "
     f"TRE is within {ALIKE_MM:g} mm of it. ms: processing time of a frame from rectification to "
@@ -25,7 +26,8 @@ _PARTS = (
     "the whole method pairs this way as well: what can differ is the first registration, and the "
     "search for a bone that was lost.",
     "- without contour: the pose is that of the surface alone.",
-    "- without second look: a doubted bone is not looked at again without what is mirrored in it.",
+    "- without second look: a bone whose pose is in doubt is not measured again without the "
+    "highlights, the lamps that are mirrored in it.",
     "- without judge: every pose that is found is taken as OK and carried on, so that doubt begins "
     "no search either. This is what would have been shown.",
 )
@@ -60,13 +62,14 @@ def make_ablation_tables(
     return "\n".join(parts)
 
 
-def _format_place(stage: str, situation: str, rows: Sequence[VariantRow]) -> list[str]:
-    is_all = stage == ALL
-    told = next((one.title for name, one in SITUATIONS.items() if name == situation), situation)
+def _format_place(stage: str, situation: SituationOrAll, rows: Sequence[VariantRow]) -> list[str]:
+    """The table of one stage and situation; that of all has the registration's time as well."""
+    is_all = situation == ALL
     columns = [*_COLUMNS, "registration, s"] if is_all else [*_COLUMNS]
-    title = "All stages and situations" if is_all else f"Stage {stage}, {told}"
     lines = [
-        f"## {title}",
+        "## All stages and situations"
+        if situation == ALL
+        else f"## Stage {stage}, {SITUATIONS[situation].title}",
         "",
         f"Tests: {rows[0].n_tests}, frames: {rows[0].n_frames}.",
         "",
@@ -74,16 +77,16 @@ def _format_place(stage: str, situation: str, rows: Sequence[VariantRow]) -> lis
         "|---" * (len(columns) + 1) + "|",
     ]
     lines += [_format_row(row, has_registration=is_all) for row in rows]
-    return [*lines, "", tell_fill(rows)] if is_all else lines
+    return [*lines, "", _tell_fill(rows)] if is_all else lines
 
 
 def _format_row(row: VariantRow, *, has_registration: bool) -> str:
     cells = [
         f"`{row.variant}`" if row.variant == WHOLE else row.variant,
         _share(row.ok_share),
-        _mm(row.tre_ok_mm),
-        _mm(row.tre_any_mm),
-        _mm(row.worst_ok_mm),
+        format_mm(row.tre_ok_mm),
+        format_mm(row.tre_any_mm),
+        format_mm(row.worst_ok_mm),
         f"{row.n_wrong}",
         _share(row.coverage),
         _share(row.n_alike / max(row.n_frames, 1)),
@@ -94,7 +97,7 @@ def _format_row(row: VariantRow, *, has_registration: bool) -> str:
     return "| " + " | ".join(cells) + " |"
 
 
-def tell_fill(rows: Sequence[VariantRow]) -> str:
+def _tell_fill(rows: Sequence[VariantRow]) -> str:
     """What the fill changes and costs, of the rows of one place."""
     found = {row.variant: row for row in rows}
     whole, without = found[WHOLE], found[WITHOUT_FILL]
@@ -108,10 +111,6 @@ def tell_fill(rows: Sequence[VariantRow]) -> str:
         f"{told} The median frame took {whole.median_ms:.1f} ms with the fill, and "
         f"{without.median_ms:.1f} ms without it and the hiding of guides."
     )
-
-
-def _mm(value: float | None) -> str:
-    return _number(value, 3 if value is None or value < 10.0 else 0)
 
 
 def _number(value: float | None, n_digits: int) -> str:

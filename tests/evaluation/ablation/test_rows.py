@@ -1,12 +1,13 @@
 """Rows of an ablation: pooled over samples, compared with the whole method frame by frame."""
 
+import math
+
 import pytest
 
 from navapp.evaluation.ablation.rows import ALL, make_variant_rows
 from navapp.evaluation.ablation.settings import VARIANTS, WHOLE
-from navapp.evaluation.campaign import Done
-from navapp.evaluation.paper.cases import Case, list_tests
-from navapp.evaluation.scores import Followed
+from navapp.evaluation.paper.cases import Case
+from tests.evaluation.ablation.scored_variants import done_by_variants
 from tests.evaluation.scored import followed, score
 
 OPENING = [Case(sample, "opening", "overlay") for sample in ("man", "woman")]
@@ -15,20 +16,13 @@ DOUBTED = score(3.0, "DEGRADED")
 LOST = score(None, "LOST", bound_mm=None)
 
 
-def done(cases, whole: Followed, **others: Followed) -> list[Done]:
-    """A test of each case; variants without frames of their own are as the whole method."""
-    named = {name.replace("_", " "): one for name, one in others.items()}
-    answers = {name: named.get(name, whole) for name in VARIANTS}
-    return [Done(test, dict(answers)) for test in list_tests(cases, 1, 1)]
-
-
 def rows_of(given, timed=()) -> dict[tuple[str, str], dict]:
     rows = make_variant_rows(given, timed)
     return {(row.stage, row.variant): row for row in rows}
 
 
 def test_samples_are_pooled_stages_are_not_and_all_stand_first() -> None:
-    given = done([*OPENING, PATELLA], followed(score(0.1), score(0.2)))
+    given = done_by_variants([*OPENING, PATELLA], followed(score(0.1), score(0.2)))
     rows = make_variant_rows(given, [])
     assert [row.variant for row in rows] == list(VARIANTS) * 3
     assert [(row.stage, row.situation) for row in rows[:: len(VARIANTS)]] == [
@@ -41,7 +35,7 @@ def test_samples_are_pooled_stages_are_not_and_all_stand_first() -> None:
 
 def test_ok_frames_and_all_poses_have_means_of_their_own() -> None:
     whole = followed(score(0.1), score(0.4), DOUBTED, LOST)
-    row = rows_of(done([PATELLA], whole))["patella", WHOLE]
+    row = rows_of(done_by_variants([PATELLA], whole))["patella", WHOLE]
     assert (row.n_ok, row.ok_share) == (2, 0.5)
     assert row.tre_ok_mm == pytest.approx(0.25)
     assert row.tre_any_mm == pytest.approx(3.5 / 3.0)
@@ -53,20 +47,21 @@ def test_wrong_is_ok_over_a_millimetre_and_beyond_the_bound() -> None:
     believed = followed(
         score(0.1), score(1.2), score(1.2, bound_mm=1.5), score(0.7), score(3.0, "LOST")
     )
-    row = rows_of(done([PATELLA], followed(*[DOUBTED] * 5), without_judge=believed))[
+    row = rows_of(done_by_variants([PATELLA], followed(*[DOUBTED] * 5), without_judge=believed))[
         "patella", "without judge"
     ]
     assert (row.n_ok, row.n_wrong) == (4, 1)
     assert row.coverage == 0.5
 
 
-def test_the_same_is_the_same_to_the_last_bit() -> None:
+def test_a_frame_that_differs_in_its_last_bit_or_in_a_reason_is_not_the_same() -> None:
     whole = followed(score(0.1), score(0.2), DOUBTED)
     other = followed(
-        score(0.1, total_ms=99.0), score(0.2 + 1e-16 + 2**-54), score(3.0, "DEGRADED", reasons=())
+        score(0.1, total_ms=99.0),
+        score(math.nextafter(0.2, 1.0)),
+        score(3.0, "DEGRADED", reasons=()),
     )
-    rows = rows_of(done([PATELLA], whole, without_contour=other))
-    assert 0.2 + 1e-16 + 2**-54 != 0.2
+    rows = rows_of(done_by_variants([PATELLA], whole, without_contour=other))
     assert rows["patella", "without contour"].n_same == 1, "only the time differs"
     assert rows["patella", "without contour"].n_alike == 3
     assert rows["patella", WHOLE].n_same == rows["patella", "without judge"].n_same == 3
@@ -77,12 +72,14 @@ def test_alike_is_the_same_status_and_nearly_the_same_error() -> None:
     other = followed(
         score(0.1009), score(0.2011), score(0.3, "LOST"), LOST, score(0.1, "LOST"), LOST
     )
-    row = rows_of(done([PATELLA], whole, without_contour=other))["patella", "without contour"]
+    row = rows_of(done_by_variants([PATELLA], whole, without_contour=other))[
+        "patella", "without contour"
+    ]
     assert (row.n_alike, row.n_same) == (2, 1)
 
 
 def test_times_are_of_frames_in_which_a_bone_was_followed_in_their_own_pass() -> None:
-    timed = done(
+    timed = done_by_variants(
         [PATELLA],
         followed(
             score(0.1, total_ms=10.0), score(0.1, total_ms=20.0), score(0.1, total_ms=60.0),
@@ -91,7 +88,7 @@ def test_times_are_of_frames_in_which_a_bone_was_followed_in_their_own_pass() ->
             registration_s=0.5,
         ),
     )  # fmt: skip
-    given = done([PATELLA], followed(score(0.1, total_ms=700.0)))
+    given = done_by_variants([PATELLA], followed(score(0.1, total_ms=700.0)))
     row = rows_of(given, timed)["patella", WHOLE]
     assert (row.median_ms, row.mean_ms, row.registration_s) == (20.0, 30.0, 0.5)
     untimed = rows_of(given)["patella", WHOLE]
@@ -99,7 +96,7 @@ def test_times_are_of_frames_in_which_a_bone_was_followed_in_their_own_pass() ->
 
 
 def test_without_an_ok_frame_there_are_no_figures_of_ok_frames() -> None:
-    row = rows_of(done([PATELLA], followed(LOST)))["patella", WHOLE]
+    row = rows_of(done_by_variants([PATELLA], followed(LOST)))["patella", WHOLE]
     figures = (row.tre_ok_mm, row.tre_any_mm, row.worst_ok_mm, row.coverage)
     assert figures == (None,) * 4
     assert row.n_frames == 1
