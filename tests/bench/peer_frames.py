@@ -4,16 +4,16 @@ usage: .venv-peers/bin/python -m tests.bench.peer_frames FOLDER
        .venv-peers/bin/python -m tests.bench.peer_frames --check
 
 FOLDER is one of `navapp evaluate`. Its tests are rendered again from their seeds, and followed by
-every peer from the pose that our registration finds in the first frame. `peers/` gets a file a test
-as it is done. Started again, it goes on with what is missing, be it a test or a peer. The name of
-each test is printed as soon as its file is there. One test at a time, so that the times are those
-of one tracker. `--check` only loads what the peers need.
+every peer from the pose that our registration finds in the first frame. As soon as a test is done,
+its file is written into `peers/`, and its name is printed. Started again, it follows only the tests
+that lack a file, or a peer in it. One test is run at a time, so that the times are those of one
+tracker. `--check` only loads what the peers need.
 """
 
 import json
 import sys
 import time
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from navapp.evaluation.following import follow
@@ -26,7 +26,7 @@ from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import RigidTransform
 from tests.bench.peer_trackers import Peer, make_peers
 
-# So many frames are searched for the bone, as by the operator of our own tests.
+# In so many frames the bone is searched for, as in the tests of our own methods.
 _MOST_REGISTRATIONS = 5
 
 
@@ -51,42 +51,50 @@ def main(argument: str) -> None:
 
 def follow_with_all(test: CaseTest, sequence: KnownSequence, peers: dict[str, Peer]) -> PeerTest:
     """Every peer, one after the other, from the same first pose."""
-    begun = find_start(sequence)
-    return PeerTest(test, {name: score(sequence, begun, peer) for name, peer in peers.items()})
+    start = find_start(sequence)
+    return PeerTest(test, {name: score(sequence, start, peer) for name, peer in peers.items()})
 
 
-def find_start(sequence: KnownSequence) -> tuple[int, RigidTransform, TriangleMesh] | None:
-    """Frame and pose of our own first registration, and the bone's surface; None: there is none."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Start:
+    """What our own first registration has found."""
+
+    place: int  # of its frame in the sequence
+    pose: RigidTransform  # left camera from bone
+    surface: TriangleMesh  # of what is left of the bone
+
+
+def find_start(sequence: KnownSequence) -> Start | None:
+    """In the first frame, or in one of the next; None: the bone was not found."""
     for place in range(min(_MOST_REGISTRATIONS, len(sequence.frames))):
         part = slice(place, place + 1)
         here = replace(sequence, frames=sequence.frames[part], truth=sequence.truth[part])
         answers = follow(here, "bimcc")
         (pose,) = answers.poses
         if answers.followed.registration_s is not None and pose is not None:
-            return place, pose, answers.surface
+            return Start(place, pose, answers.surface)
     return None
 
 
-def score(
-    sequence: KnownSequence, begun: tuple[int, RigidTransform, TriangleMesh] | None, peer: Peer
-) -> tuple[PeerFrame, ...]:
-    """Of all frames but the first one; without a pose before the bone was found."""
-    start, first, surface = begun or (len(sequence.frames), None, None)
-    tracker = None if first is None else peer(sequence.rig, surface, sequence.frames[start], first)
-    scores = []
-    for place in range(1, len(sequence.frames)):
-        if tracker is None or place < start:
-            scores.append(PeerFrame(place, None, None))
-            continue
+def score(sequence: KnownSequence, start: Start | None, peer: Peer) -> tuple[PeerFrame, ...]:
+    """Of all frames but the first one; those before the start count as without a pose."""
+    n_frames = len(sequence.frames)
+    if start is None:
+        return tuple(PeerFrame(place, None, None) for place in range(1, n_frames))
+    scores = [PeerFrame(place, None, None) for place in range(1, start.place)]
+    tracker = peer(sequence.rig, start.surface, sequence.frames[start.place], start.pose)
+    for place in range(max(1, start.place), n_frames):
         started_s = time.perf_counter()
         pose = tracker(sequence.frames[place])
         ms = 1e3 * (time.perf_counter() - started_s)
-        scores.append(PeerFrame(place, measure(sequence, place, pose), ms))
+        scores.append(PeerFrame(place, measure_tre_mm(sequence, place, pose), ms))
     return tuple(scores)
 
 
-def measure(sequence: KnownSequence, place: int, pose: RigidTransform | None) -> float | None:
-    """TRE over the stage's targets, as of our methods, mm."""
+def measure_tre_mm(
+    sequence: KnownSequence, place: int, pose: RigidTransform | None
+) -> float | None:
+    """Over the stage's targets, as for our methods."""
     true, stage = sequence.truth[place], sequence.stage
     if pose is None or true is None:
         return None
@@ -104,5 +112,5 @@ if __name__ == "__main__":
         sys.exit((__doc__ or "").strip())
     try:
         main(sys.argv[1])
-    except KeyboardInterrupt:  # who began it has been stopped as well, and says so
+    except KeyboardInterrupt:  # `navapp evaluate` is stopped by the same ctrl+c, and says so
         sys.exit(130)

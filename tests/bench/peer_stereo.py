@@ -1,4 +1,4 @@
-"""Points of what stands before the rig, by OpenCV's SGBM with or without the WLS filter."""
+"""Measured points around a bone, by OpenCV's SGBM with or without the contributed WLS filter."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -13,6 +13,7 @@ from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer import bounds_of
 from tests.bench.sgbm import make_matcher
 
+# OpenCV tells disparities in sixteenths of a pixel, and looks for a multiple of sixteen of them.
 _OPENCV_SCALE, _BLOCK = 16, 16
 
 
@@ -21,14 +22,14 @@ class StereoSettings:
     """How a peer's points are made."""
 
     window_px: int
-    wls_lambda: float | None  # of OpenCV's contributed filter over both views' matches; None: none
+    wls_lambda: float | None  # strength of the filter; None: it is not used
     margin_px: int  # around the bone's box
     margin_mm: float  # in depth, before and behind the bone
-    n_points: int  # at most so many go on
+    n_points: int  # so many go on, or up to twice as many; all where there are fewer
     uniqueness_percent: int = 5
     speckle_px: int = 80
     wls_sigma: float = 1.5
-    least_confidence: float = 127.0  # of 255, that the filter has in a pixel
+    least_confidence: float = 127.0  # of 255, of the filter in a pixel that is used
 
 
 def find_points_mm(
@@ -38,7 +39,7 @@ def find_points_mm(
     rectified_from_bone: RigidTransform,
     settings: StereoSettings,
 ) -> FloatArray | None:
-    """(N, 3) in the rectified left camera, around where the bone was; None: it is out of view."""
+    """(N, 3) in the rectified left camera, around the bone's last pose; None: out of view."""
     geometry = rectifier.geometry
     box, (near_mm, far_mm) = bounds_of(surface_mm, rectified_from_bone, geometry)
     if box is None or near_mm <= settings.margin_mm:
@@ -58,26 +59,39 @@ def find_points_mm(
 
 
 def _match(pair: RectifiedPair, lowest: int, count: int, settings: StereoSettings) -> FloatArray:
-    """(h, w) of the pair's box, NaN where nothing was matched."""
+    """(h, w) disparity of the pair's box, px; NaN where nothing was matched.
+
+    Args:
+        pair: rectified pictures.
+        lowest: smallest disparity that is looked for, px.
+        count: so many are, a multiple of 16.
+        settings: of the matcher, and of the filter.
+    """
     # The right picture is moved by the lowest disparity, and both crops begin so far to the left
     # that no column of the box lacks a partner.
     box, lead = pair.box, count + settings.window_px
     left = _crop(pair.left, box.x - lead, box.width + lead, box)
     right = _crop(pair.right, box.x - lead - lowest, box.width + lead, box)
-    forward = _make_matcher(0, count, settings)
-    found = forward.compute(left, right)
-    if settings.wls_lambda is None:
-        raw = np.asarray(found)[:, lead:].astype(np.float64)
-        return np.where(raw >= 0.0, raw / _OPENCV_SCALE + lowest, np.nan)
+    found = np.asarray(_make_matcher(0, count, settings).compute(left, right))
+    is_sure = np.ones(found.shape, dtype=np.bool_)
+    if settings.wls_lambda is not None:
+        found, is_sure = _filter(found, left, right, count, settings)
+    raw = found[:, lead:].astype(np.float64)
+    return np.where((raw >= 0.0) & is_sure[:, lead:], raw / _OPENCV_SCALE + lowest, np.nan)
+
+
+def _filter(
+    found: Any, left: Any, right: Any, count: int, settings: StereoSettings
+) -> tuple[Any, Any]:
+    """The left picture's matches, filtered with those of the right one; where that is sure."""
     backward = _make_matcher(1 - count, count, settings)
     wls = cv2.ximgproc.createDisparityWLSFilterGeneric(True)
     wls.setLambda(settings.wls_lambda)
     wls.setSigmaColor(settings.wls_sigma)
     wls.setDepthDiscontinuityRadius(settings.window_px // 2 + 1)
     filtered = wls.filter(found, left, None, backward.compute(right, left))
-    raw = np.asarray(filtered)[:, lead:].astype(np.float64)
-    is_sure = np.asarray(wls.getConfidenceMap())[:, lead:] >= settings.least_confidence
-    return np.where((raw >= 0.0) & is_sure, raw / _OPENCV_SCALE + lowest, np.nan)
+    is_sure = np.asarray(wls.getConfidenceMap()) >= settings.least_confidence
+    return np.asarray(filtered), is_sure
 
 
 def _make_matcher(lowest: int, count: int, settings: StereoSettings) -> Any:
@@ -95,7 +109,7 @@ def _crop(picture: Any, x: int, width: int, box: Box) -> Any:
 
 
 def _lift(disparity_px: FloatArray, pair: RectifiedPair, n_points: int) -> FloatArray:
-    """Evenly spread points of what was matched."""
+    """(N, 3) points of what was matched, spread evenly."""
     box, geometry = pair.box, pair.geometry
     rows, columns = np.nonzero(disparity_px > 0.0)
     every = max(1, len(rows) // n_points)

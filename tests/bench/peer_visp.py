@@ -26,7 +26,7 @@ class VispTracker:
         surface: of the bone.
         frame: the first pair.
         pose: left camera from bone in it.
-        n_faces: of the coarse model; each is taken for plane.
+        n_faces: of the coarse model, whose faces ViSP takes for planes.
     """
 
     def __init__(
@@ -63,7 +63,7 @@ class VispTracker:
         words = self._process.stdout.readline().split()
         if len(words) != 16:
             if words != [b"lost"]:
-                raise RuntimeError(f"{PROGRAM} ended")
+                raise RuntimeError(f"{PROGRAM} ended without a pose: run `make peers-visp` again")
             return None
         matrix = np.array(words, dtype=float).reshape(4, 4)
         matrix[:3, 3] *= 1e3
@@ -81,7 +81,7 @@ class VispTracker:
 
 
 def format_cao(surface: TriangleMesh, n_faces: int) -> str:
-    """A surface in so many triangles as ViSP's text of a model, m."""
+    """A surface, simplified to so many triangles, as the text of a model file of ViSP; in m."""
     points_mm, faces = fast_simplification.simplify(
         np.array(surface.vertices_mm, dtype=np.float32),
         np.array(surface.faces, dtype=np.int32),

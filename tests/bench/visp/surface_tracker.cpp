@@ -1,4 +1,5 @@
-// Drives ViSP's model-based tracker (vpMbGenericTracker, KLT points on faces, two cameras) by a pipe.
+// Runs ViSP's model-based tracker (vpMbGenericTracker, KLT points on faces, two cameras) on pictures
+// that come through a pipe.
 //
 // usage: surface_tracker FOCAL_PX CENTRE_X_PX CENTRE_Y_PX WIDTH HEIGHT BASELINE_M MODEL.cao
 //
@@ -35,23 +36,24 @@ bool read_pair(Picture &left, Picture &right) {
          std::fread(right.bitmap, 1, right.getSize(), stdin) == right.getSize();
 }
 
-vpKltOpencv make_points() {
-  vpKltOpencv points;
-  points.setMaxFeatures(1500);
-  points.setWindowSize(11);
-  points.setQuality(0.005);
-  points.setMinDistance(4);
-  points.setHarrisFreeParameter(0.01);
-  points.setBlockSize(3);
-  points.setPyramidLevels(3);
-  return points;
+vpKltOpencv make_klt() {
+  vpKltOpencv klt;
+  klt.setMaxFeatures(1500);
+  klt.setWindowSize(11);
+  klt.setQuality(0.005);
+  klt.setMinDistance(4);
+  klt.setHarrisFreeParameter(0.01);
+  klt.setBlockSize(3);
+  klt.setPyramidLevels(3);
+  return klt;
 }
 
 } // namespace
 
 int main(int count, char **values) {
   if (count != 8) {
-    std::fprintf(stderr, "usage: surface_tracker FOCAL CX CY WIDTH HEIGHT BASELINE MODEL.cao\n");
+    std::fprintf(stderr, "usage: surface_tracker FOCAL_PX CENTRE_X_PX CENTRE_Y_PX WIDTH HEIGHT "
+                         "BASELINE_M MODEL.cao\n");
     return 2;
   }
   std::cout.rdbuf(std::cerr.rdbuf()); // what ViSP says must not be taken for poses
@@ -64,7 +66,7 @@ int main(int count, char **values) {
   vpMbGenericTracker tracker(2, vpMbGenericTracker::KLT_TRACKER);
   tracker.setCameraParameters(camera, camera);
   tracker.setCameraTransformationMatrix("Camera2", right_from_left);
-  tracker.setKltOpencv(make_points());
+  tracker.setKltOpencv(make_klt());
   tracker.setKltMaskBorder(2);
   tracker.setAngleAppear(vpMath::rad(70.0));
   tracker.setAngleDisappear(vpMath::rad(75.0));
@@ -82,7 +84,7 @@ int main(int count, char **values) {
       tracker.getPose(pose);
       write_pose(pose);
     } catch (const vpException &) {
-      // It goes on from where it had the bone last.
+      // It goes on from its last pose.
       tracker.initFromPose(left, right, pose, right_from_left * pose);
       std::printf("lost\n");
     }
