@@ -14,7 +14,7 @@ _PYTHON = Path(".venv-peers", "bin", "python")
 
 
 def check_peers(root: Path = _ROOT) -> None:
-    """Refuse to begin what could not be done to its end.
+    """Refuse --peers where the peers cannot be run, before anything else is.
 
     Raises:
         UsageError: the program, its environment, or a library in that is missing.
@@ -38,17 +38,17 @@ def check_peers(root: Path = _ROOT) -> None:
 
 
 def run_program(folder: Path, on_done: Callable[[str], None], root: Path = _ROOT) -> None:
-    """Follow every test of an evaluation that the peers have not done yet.
+    """Let the peers follow every test of an evaluation that they have not followed yet.
 
     Args:
         folder: of the evaluation.
-        on_done: told the name of each test as it is there.
+        on_done: told the name of each test that is done, also of those that were before.
         root: of the repository.
 
     Raises:
         NavappError: the program failed; what is done is kept.
     """
-    # Its errors go where ours go. With its output closed it ends after the test that it is at.
+    # Its errors go to our stderr. If this process is killed, it ends when it tells its next test.
     with subprocess.Popen(
         _command(root, str(folder.resolve())), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
         text=True, env=make_child_environment(),

@@ -12,9 +12,9 @@ from navapp.evaluation.paper.cases import SITUATIONS, STAGE_NAMES, CaseTest, Sit
 from navapp.evaluation.paper.rows import WRONG_MM
 from navapp.evaluation.peers.scores import PeerFrame, PeerTest
 
-_OK, _ALL = "bimcc, OK frames", "bimcc, every pose"
+_OK, _EVERY = "bimcc, OK frames", "bimcc, every pose"
 
-# Frames of a test by the name of the tracker.
+# The frames of a test, by the name of the tracker.
 _Frames = Mapping[str, tuple[PeerFrame, ...]]
 
 
@@ -26,12 +26,12 @@ class PeerRow:
     situation: SituationName
     tracker: str
     n_tests: int
-    n_frames: int  # that count
+    n_frames: int  # counted ones
     tre_median_mm: float | None  # over frames with a pose; None without any
     tre_p95_mm: float | None
     n_within: int  # frames with a pose that is at most `WRONG_MM` off
     n_no_pose: int
-    p50_ms: float | None  # None: no time was taken
+    p50_ms: float | None  # of a frame; None: no time was taken
 
     def to_json(self) -> dict[str, Any]:
         """Named values."""
@@ -41,7 +41,7 @@ class PeerRow:
 def make_peer_rows(
     peers: Sequence[PeerTest], done: Sequence[Done[CaseTest]], timed: Sequence[Done[CaseTest]]
 ) -> list[PeerRow]:
-    """Pool the tests of each stage and situation; ours are those of the same tests.
+    """Pool the tests of each stage and situation; our rows are of the peers' tests alone.
 
     Args:
         peers: tests that the peers have done.
@@ -52,35 +52,43 @@ def make_peer_rows(
     our_times = {one.test: _take_ours(one) for one in timed}
     rows = []
     for stage, situation in product(STAGE_NAMES, SITUATIONS):
-        case = (stage, situation)
-        shown = [one for one in peers if (one.test.case.stage, one.test.case.situation) == case]
-        frames = [{**ours.get(one.test, {}), **one.frames} for one in shown]
-        times = [{**our_times.get(one.test, {}), **one.frames} for one in shown]
+        tests = [
+            one
+            for one in peers
+            if (one.test.case.stage, one.test.case.situation) == (stage, situation)
+        ]
+        frames = [{**ours.get(one.test, {}), **one.frames} for one in tests]
+        times = [{**our_times.get(one.test, {}), **one.frames} for one in tests]
         names = dict.fromkeys(name for one in frames for name in one)
-        rows += [_pool(case, name, _of(name, frames), _of(name, times)) for name in names]
+        rows += [
+            _make_row(stage, situation, name, _select(name, frames), _select(name, times))
+            for name in names
+        ]
     return rows
 
 
-def _of(name: str, tests: Sequence[_Frames]) -> list[tuple[PeerFrame, ...]]:
+def _select(name: str, tests: Sequence[_Frames]) -> list[tuple[PeerFrame, ...]]:
+    """The frames of one tracker, of each test that it has followed."""
     return [one[name] for one in tests if name in one]
 
 
 def _take_ours(done: Done[CaseTest]) -> dict[str, tuple[PeerFrame, ...]]:
-    """Ours twice: as shown, only where the judge says OK, and every pose."""
+    """Ours twice: with a pose only where the judge says OK, and with every pose."""
     followed = done.followed.get("bimcc")
     if followed is None:
         return {}
-    shown = tuple(
+    ok = tuple(
         PeerFrame(one.index, one.tre_mm if one.is_ok else None, one.total_ms)
         for one in followed.frames
     )
     every = tuple(PeerFrame(one.index, one.tre_mm, one.total_ms) for one in followed.frames)
-    return {_OK: shown, _ALL: every}
+    return {_OK: ok, _EVERY: every}
 
 
-def _pool(
-    case: tuple[str, SituationName],
-    name: str,
+def _make_row(
+    stage: str,
+    situation: SituationName,
+    tracker: str,
     tests: Sequence[tuple[PeerFrame, ...]],
     timed: Sequence[tuple[PeerFrame, ...]],
 ) -> PeerRow:
@@ -88,8 +96,9 @@ def _pool(
     errors_mm = [frame.tre_mm for frame in frames if frame.tre_mm is not None]
     times_ms = [frame.ms for test in timed for frame in test if frame.ms is not None]
     return PeerRow(
-        *case,
-        tracker=name,
+        stage=stage,
+        situation=situation,
+        tracker=tracker,
         n_tests=len(tests),
         n_frames=len(frames),
         tre_median_mm=float(np.median(errors_mm)) if errors_mm else None,

@@ -1,4 +1,4 @@
-"""What other people's trackers made of the tests, and the files that say so."""
+"""Results of other people's trackers, and the files that keep them."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -19,7 +19,7 @@ class PeerFrame:
 
     index: int  # of the frame in its sequence
     tre_mm: float | None  # mean over the stage's targets; None without a pose
-    ms: float | None  # from the two pictures to the pose; None: it had not begun
+    ms: float | None  # from the two pictures to the pose; None before the peer has started
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,12 +31,12 @@ class PeerTest:
 
 
 def file_of(folder: Path, test: CaseTest) -> Path:
-    """Of a test's results, in the folder of an evaluation."""
+    """Where the results of a test are kept, in the folder of an evaluation."""
     return folder / _FOLDER / f"{test.name}.json"
 
 
 def write_peers(folder: Path, done: PeerTest) -> None:
-    """Keep a test; the file appears when all of it is there."""
+    """Keep the results of a test; the file appears when it is whole."""
     path = file_of(folder, done.test)
     path.parent.mkdir(exist_ok=True)
     content: dict[str, Any] = {
@@ -61,8 +61,8 @@ def _read(folder: Path, test: CaseTest) -> PeerTest:
     try:
         peers = json.loads(path.read_text(encoding="utf-8"))["peers"]
         frames = {
-            name: tuple(PeerFrame(one["index"], one["tre_mm"], one["ms"]) for one in told)
-            for name, told in peers.items()
+            name: tuple(PeerFrame(one["index"], one["tre_mm"], one["ms"]) for one in kept)
+            for name, kept in peers.items()
         }
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise InputError(

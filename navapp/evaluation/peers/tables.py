@@ -11,11 +11,11 @@ from navapp.evaluation.peers.scores import PeerTest
 _ABOUT = (
     "Other people's trackers on the same frames, all samples of a stage and situation together. A "
     "peer has no registration of its own: it starts from the pose that ours found in the first "
-    "frame, and is never helped again; one that has lost the bone goes on from where it is. "
+    "frame, and is never helped again; one that has lost the bone goes on from its last pose. "
     "It gets the same rig, the same surface of the bone, and no truth. TRE: over the frames with a "
-    "pose. Within 1 mm and no pose: of all counted frames. A peer has no judge, and tells a pose "
-    "that is far off like any other. ms: median; ours with overlay, judge and what hides the bone, "
-    "a peer's until its pose, each while nothing else ran."
+    "pose. Within 1 mm and no pose: of all counted frames. A peer has no judge: a pose that is far "
+    "off counts like any other. ms: median time of a frame, taken while nothing else ran: of a "
+    "peer until it has the pose, of ours with judge, foreground and overlay as well."
 )
 
 
