@@ -223,6 +223,7 @@ class _Fit:
         information = compute_information(
             pairs._replace(direction=self._model.smooth_normals.take(pairs.vertex[:n], axis=0)),
             n, pose, self._model.centre_mm, self._scene.n_sharing_errors,
+            self._scene.n_sharing_relief,
         )  # fmt: skip
         reasons = [] if is_converged else [Reason.NOT_CONVERGED]
         reasons += [Reason.DEGENERATE] * information.is_degenerate

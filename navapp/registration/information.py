@@ -35,6 +35,9 @@ _CLAIM_COUNT = 6.0
 # the rim.
 _MOST_FAR, _BY_CHANCE = 0.5, 1.0
 _FEWEST = 6.0
+# By how much the surface of a bone differs from its model beyond what the plan tells, along its
+# normal (standard deviation), and over which distance that goes together (tests.bench.bounds).
+RELIEF_SD_MM, RELIEF_LENGTH_MM = 0.05, 4.0
 # Residuals that show nothing at all (drawn data) still leave a scale.
 _LEAST_SQUARED_RATIO = 1e-4
 
@@ -72,14 +75,21 @@ class Information:
 
 
 def compute_information(
-    pairs: Pairs, n: int, pose: RigidTransform, centre_mm: FloatArray, n_sharing_errors: float
+    pairs: Pairs,
+    n: int,
+    pose: RigidTransform,
+    centre_mm: FloatArray,
+    n_sharing_errors: float,
+    n_sharing_relief: float = 0.0,
 ) -> Information:
     """Information of the first n pairs, weighted by kernel over variance, about `scene_from_bone`.
 
     Pairs and the model's centre (3,) are in bone coordinates. So many neighbouring pairs as
-    `n_sharing_errors` have their errors in common.
+    `n_sharing_errors` have their errors in common, and so many as `n_sharing_relief` the relief by
+    which the bone differs from its model.
 
-    Source: Gauss-Newton normal equations at the solution; their inverse is the covariance.
+    Source: Gauss-Newton normal equations at the solution; their inverse is the covariance. That of
+    the relief is the one of an estimator whose weights do not know it.
     """
     seen_mm, lever_mm = find_weighted_centre(pairs, n)
     H, g = sum_plane_system(pairs, n, seen_mm, lever_mm)
@@ -101,7 +111,15 @@ def compute_information(
         size_variance = 1.0 / size_information
     H, _ = sum_plane_system(pairs, n, centre_mm, lever_mm)
     change = np.diag([1.0] * 3 + [1.0 / lever_mm] * 3) @ turned
-    covariance = n_sharing_errors * change @ np.linalg.inv(H) @ change.T
+    inverse = np.linalg.inv(H)
+    covariance = n_sharing_errors * inverse
+    if n_sharing_relief > 0.0:
+        squared, _ = sum_plane_system(
+            pairs._replace(weight=pairs.weight**2), n, centre_mm, lever_mm
+        )
+        relief_mm2 = n_sharing_relief * RELIEF_SD_MM**2
+        covariance = covariance + relief_mm2 * (inverse @ squared @ inverse)
+    covariance = change @ covariance @ change.T
     size_sigma_mm = math.sqrt(n_sharing_errors * size_variance)
     return Information(0.5 * (covariance + covariance.T), free, size_mm, size_sigma_mm)
 

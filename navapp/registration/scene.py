@@ -1,5 +1,6 @@
 """What was measured, ready to be registered to."""
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -33,18 +34,30 @@ class Scene:
     sigma_ray_mm: FloatArray | None = None
     # so many neighbouring points have their errors in common and count as one.
     n_sharing_errors: float = 1.0
+    # so many have the relief in common by which a bone differs from its model; 0: not counted.
+    n_sharing_relief: float = 0.0
     thinned_to: int = 500  # the coarse loop uses about so many points
     # model points look for partners in the scene, too; False: scene points alone, as in plain ICP.
     pairs_backward: bool = True
 
     @classmethod
     def from_stereo(
-        cls, cloud: SurfaceCloud, correlation_px: float, *, pairs_backward: bool = True
+        cls,
+        cloud: SurfaceCloud,
+        correlation_px: float,
+        relief_px: float = 0.0,
+        *,
+        pairs_backward: bool = True,
     ) -> "Scene":
-        """A cloud in the rectified left camera, whose errors go together over a distance."""
+        """A cloud in the rectified left camera, whose errors go together over a distance.
+
+        The correlation of a bone's relief falls to 1 / e over `relief_px`; 0: it is not counted.
+        """
         n_sharing_errors = max(1.0, (correlation_px / cloud.stride_px) ** 2)
+        # The integral of exp(-r / length) over the picture.
+        n_sharing_relief = 2.0 * math.pi * (relief_px / cloud.stride_px) ** 2
         return cls(
-            cloud.points_mm, np.zeros(3), cloud.sigma_ray_mm, n_sharing_errors,
+            cloud.points_mm, np.zeros(3), cloud.sigma_ray_mm, n_sharing_errors, n_sharing_relief,
             pairs_backward=pairs_backward,
         )  # fmt: skip
 

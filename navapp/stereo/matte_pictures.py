@@ -3,7 +3,8 @@
 On a sawn face that mirrors a lamp the two cameras see glints in different places, and match the
 face beside where it is (`python -m tests.bench.face_highlights`). Light that is mirrored has the
 lamp's colour, light from within the bone has the bone's own. In pictures whose white is the lamp's,
-red less blue holds nothing of what is mirrored, but where a channel is clipped.
+red less blue holds nothing of what is mirrored. Where a channel is clipped it means nothing: such
+pixels are filled from those around them, so that the windows beside them keep their texture.
 
 Source: the dichromatic model of reflection, Shafer 1985.
 """
@@ -22,6 +23,9 @@ _MOST_SHARE, _MOST_VALUE = 0.99, 230.0
 _LEAST_DIFFERENCE = 0.02
 # Values from here on may be clipped.
 _CLIPPED = 254
+# Of the weights by which clipped pixels are filled (standard deviation).
+_FILL_PX = 2.0
+_LEAST_WEIGHT = 1e-3
 
 
 def make_matte_pair(
@@ -51,9 +55,26 @@ def find_clipped(picture: Image) -> NDArray[np.bool_]:
 
 
 def _red_less_blue(picture: Image, blue: float) -> NDArray[np.float32]:
+    import cv2
+
     light = _light_of_value()
     red, less = light[picture[:, :, 2]], np.float32(blue) * light[picture[:, :, 0]]
-    return np.asarray(red - less, dtype=np.float32)
+    # Resampling has mixed clipped pixels into their neighbours.
+    is_mixed = cv2.dilate(find_clipped(picture).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    return _fill(red - less, is_mixed)
+
+
+def _fill(values: NDArray[np.float32], is_unknown: NDArray[np.bool_]) -> NDArray[np.float32]:
+    """Values (H, W), unknown ones as the weighted mean of those around; 0 where none is near."""
+    import cv2
+
+    if not is_unknown.any():
+        return values
+    weight = (~is_unknown).astype(np.float32)
+    around = cv2.GaussianBlur(values * weight, (0, 0), _FILL_PX)
+    total = cv2.GaussianBlur(weight, (0, 0), _FILL_PX)
+    filled = around / np.maximum(total, np.float32(_LEAST_WEIGHT))
+    return np.where(is_unknown, filled, values).astype(np.float32)
 
 
 def _scale(difference: NDArray[np.float32], gain: float) -> Image:

@@ -4,6 +4,7 @@ Four kinds: on the model at a pose, exact and near; on samples of it; freely, wh
 coarsely, to tell what lies where.
 """
 
+import math
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 
@@ -18,6 +19,7 @@ from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer import RenderedView, bounds_of
 from navapp.registration import RegistrationModel, Scene
+from navapp.registration.information import RELIEF_LENGTH_MM
 from navapp.stereo import (
     MODEL_REFINEMENT,
     CoarseMap,
@@ -36,11 +38,10 @@ FREE_CORRELATION_PX, MODEL_CORRELATION_PX = 40.0, 11.0
 _SAMPLED = replace(MODEL_REFINEMENT, n_steps=3, stops_at_rest=True, last_step_px=0.3)
 _SAMPLES_PX = 6
 # A larger gap in the answers is no highlight: something else covers the bone there. Windows that
-# reach far into it see both, and most of what covers a bone lies in front of it.
+# reach far into it see both, and most of what covers a bone lies in front of it. They count as if
+# they were off by so many times more: in places they are all that is seen of a sawn bone.
 _LARGEST_HIGHLIGHT_PX2 = 400
-_MIXED_PX = 3
-# Where a smaller fraction would be left, the gaps come from a pose that is still off.
-_LEAST_UNMIXED_FRACTION = 0.5
+_MIXED_PX, _MIXED_SIGMAS = 3, np.float32(4.0)
 # Poses of which the bounds are kept.
 _KEPT_BOUNDS = 8
 
@@ -75,12 +76,13 @@ class Measurement:
     # the model that it was measured on; None of a free measurement.
     rendered: RenderedView | None = None
     pairs_backward: bool = True  # as of `Scene`
+    relief_px: float = 0.0  # as of `Scene.from_stereo`
 
     @property
     def scene(self) -> Scene:
         """The cloud, to be registered to."""
         return Scene.from_stereo(
-            self.cloud, self.correlation_px, pairs_backward=self.pairs_backward
+            self.cloud, self.correlation_px, self.relief_px, pairs_backward=self.pairs_backward
         )
 
 
@@ -226,12 +228,22 @@ class SurfaceMeter:
         """
         return self.take_on_model(expected, refine_on_model(expected.pair, expected.support_px))
 
-    def take_on_model(self, expected: Expected, found: DisparityMap) -> Measurement:
-        """What was matched on the model's own surface, as a measurement of it."""
+    def take_on_model(
+        self,
+        expected: Expected,
+        found: DisparityMap,
+        correlation_px: float = MODEL_CORRELATION_PX,
+    ) -> Measurement:
+        """What was matched on the model's own surface, as a measurement of it.
+
+        Its errors go together over `correlation_px`.
+        """
         is_expected = np.isfinite(expected.support_px)
-        cloud = self._cloud(remove_gap_rims(found, is_expected))
+        cloud = self._cloud(doubt_gap_rims(found, is_expected))
         n_expected = max(int(np.count_nonzero(is_expected)), 1)
-        return self._measured_on_model(found, cloud, found.n_matched / n_expected, expected)
+        return self._measured_on_model(
+            found, cloud, found.n_matched / n_expected, expected, correlation_px
+        )
 
     def measure_on_samples(self, expected: Expected) -> Measurement:
         """As `measure_on_model` at every sixth pixel each way, in more steps: it sees further.
@@ -254,11 +266,18 @@ class SurfaceMeter:
         )  # fmt: skip
 
     def _measured_on_model(
-        self, found: DisparityMap, cloud: SurfaceCloud, matched_fraction: float, expected: Expected
+        self,
+        found: DisparityMap,
+        cloud: SurfaceCloud,
+        matched_fraction: float,
+        expected: Expected,
+        correlation_px: float = MODEL_CORRELATION_PX,
     ) -> Measurement:
+        depth_mm = float(np.median(cloud.points_mm[:, 2])) if len(cloud) > 0 else math.inf
+        relief_px = RELIEF_LENGTH_MM * self.geometry.focal_px / depth_mm
         return Measurement(
-            found, cloud, matched_fraction, MODEL_CORRELATION_PX, expected.view,
-            self.pairs_backward,
+            found, cloud, matched_fraction, correlation_px, expected.view, self.pairs_backward,
+            relief_px,
         )  # fmt: skip
 
     def _cloud(self, found: DisparityMap) -> SurfaceCloud:
@@ -267,18 +286,14 @@ class SurfaceMeter:
         return found.reproject(self.geometry, stride_px)
 
 
-def remove_gap_rims(found: DisparityMap, is_expected: NDArray[np.bool_]) -> DisparityMap:
-    """Without the rims of large gaps in what is expected (h, w), unless that leaves too little."""
+def doubt_gap_rims(found: DisparityMap, is_expected: NDArray[np.bool_]) -> DisparityMap:
+    """With less trust in the rims of large gaps in what is expected (h, w)."""
     import cv2
 
-    is_matched = found.origin > 0
-    gaps = large_regions(is_expected & ~is_matched, _LARGEST_HIGHLIGHT_PX2, connectivity=4)
+    gaps = large_regions(is_expected & (found.origin == 0), _LARGEST_HIGHLIGHT_PX2, connectivity=4)
     size = 2 * _MIXED_PX + 1
-    around = cv2.dilate(gaps.astype(np.uint8), np.ones((size, size), np.uint8)) > 0
-    stays = is_matched & ~around
-    if np.count_nonzero(stays) < _LEAST_UNMIXED_FRACTION * np.count_nonzero(is_matched):
-        return found
-    return found.only(stays)
+    is_rim = cv2.dilate(gaps.astype(np.uint8), np.ones((size, size), np.uint8)) > 0
+    return replace(found, sigma_px=np.where(is_rim, _MIXED_SIGMAS * found.sigma_px, found.sigma_px))
 
 
 def _spread(thin: DisparityMap, stride_px: int, shape: tuple[int, ...]) -> DisparityMap:

@@ -224,6 +224,7 @@ class Verdict:
     # rms_mm, expected_rms_mm: of the residual.
     rms_mm: float | None = None
     expected_rms_mm: float | None = None
+    spread_ratio: float = 0.0  # spread of the differences to the model over the sigma they claim
 
     @property
     def cause(self) -> Reason | None:

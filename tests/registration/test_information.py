@@ -2,7 +2,11 @@ import numpy as np
 import pytest
 
 from navapp.registration import RegistrationModel, Scene, fit_bimcc
-from navapp.registration.information import compute_information, leaves_direction_free
+from navapp.registration.information import (
+    RELIEF_SD_MM,
+    compute_information,
+    leaves_direction_free,
+)
 from navapp.registration.pairing_kernels import Pairs, make_pairs
 from navapp.registration.step_kernels import weigh
 from tests.reference import bimcc_reference as reference
@@ -49,6 +53,18 @@ def test_points_that_share_their_errors_count_as_one() -> None:
     np.testing.assert_allclose(
         compute_information(pairs, n, POSE, CENTRE, 9.0).covariance, 9.0 * alone
     )
+
+
+@pytest.mark.kernel
+def test_relief_that_neighbours_share_is_counted_beside_noise() -> None:
+    pairs, n, measured, _ = measured_pairs(make_case())
+    weigh(pairs, n, 1.0, 2.5, 0.0)
+    weight = pairs.weight[:n].copy()
+    inverse = np.linalg.inv(reference.twist_information(measured, weight, POSE, CENTRE))
+    squares = reference.twist_information(measured, weight**2, POSE, CENTRE)
+    expected = 9.0 * inverse + 40.0 * RELIEF_SD_MM**2 * inverse @ squares @ inverse
+    found = compute_information(pairs, n, POSE, CENTRE, 9.0, 40.0).covariance
+    np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-6 * np.abs(expected).max())
 
 
 def test_a_ball_leaves_three_rotations_free() -> None:

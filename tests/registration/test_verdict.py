@@ -122,7 +122,7 @@ def told(evidence: Evidence) -> tuple[Status, tuple[Reason, ...]]:
 
 
 def test_a_pose_that_nothing_speaks_against_is_ok() -> None:
-    assert decide(FINE) == Verdict(Status.OK, 0.4, (), 0.9, 0.0, 0.95, 0.1, 0.1)
+    assert decide(FINE) == Verdict(Status.OK, 0.4, (), 0.9, 0.0, 0.95, 0.1, 0.1, 0.8)
 
 
 @pytest.mark.parametrize(("row", "rule"), PAIRS)

@@ -7,28 +7,28 @@ pictures tell what is mirrored from what comes out of the bone (`stereo/matte_pi
 
 from collections.abc import Iterator
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
 from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.transform import RigidTransform
 from navapp.stereo import refine_on_model
-from navapp.stereo.matte_pictures import make_matte_pair
+from navapp.stereo.matte_pictures import find_clipped, make_matte_pair
 from navapp.tracking.following import Follower
 from navapp.tracking.frame import Fit, Frame
-from navapp.tracking.surface_meter import NEAR_VIEW, Expected, Measurement, SurfaceMeter
+from navapp.tracking.surface_meter import NEAR_BOX, NEAR_VIEW, Expected, Measurement, SurfaceMeter
 from navapp.values import DisparityMap
 
-# Where pictures without highlights answer nothing, grey ones are off by so many of the standard
-# deviations that they claim (tests.bench.bone_highlights).
-_GREY_ALONE = np.float32(1.7)
-# Spread of the differences between both answers, over what both claim. On six matt patellas it is
-# 0.62 to 0.68, on the same glossy ones 0.81 to 1.06 (tests.bench.bone_highlights); in between.
-_LEAST_CONTRADICTION = 0.75
-# With too little colour for its texture, noise contradicts as well: then fewer pixels are answered
-# than in grey; on these patellas it was 0.97 of them and more.
-_LEAST_ANSWERED = 0.95
+# Both are off by more than they claim, over the 0.65 of grey pictures of a matt bone: pictures
+# without highlights have less texture; where they answer nothing, grey ones see the highlights.
+# What is left of these goes together over more than a window (tests.bench.bone_highlights).
+_MATTE_ALONE, _GREY_ALONE = np.float32(1.5), np.float32(2.0)
+_CORRELATION_PX = 22.0
+# Spread of the differences between both answers, over what both claim, and pixels that are answered
+# without highlights, over those in grey. On nine matt patellas 0.58 to 0.70 and 0.96 to 1.03, on
+# glossy ones 0.72 to 1.23 and 1.13 to 1.59 (tests.bench.bone_highlights); in between. With too
+# little colour for its texture noise contradicts as well, but then fewer pixels are answered.
+_LEAST_CONTRADICTION, _LEAST_ANSWERED = 0.71, 1.08
 _MAD_TO_SIGMA = 1.4826
 
 
@@ -45,25 +45,41 @@ class HighlightSearch:
     def find(self, frame: Frame, pose: RigidTransform) -> Iterator[Fit]:
         """The fit at which the bone rests near a pose (rectified left camera from bone).
 
-        None of grey pictures, and of pictures without colour.
+        None where no highlights are seen: in grey pictures, without colour, on a matt bone.
         """
         region = self._meter.find_region(pose, NEAR_VIEW)
-        if frame.rectify_coloured is None or region is None:
+        expected = self._meter.render(frame.pair, pose, NEAR_BOX)
+        if frame.rectify_coloured is None or region is None or expected is None:
             return
-        measure = partial(self._measure, coloured=frame.rectify_coloured(*region))
+        coloured = frame.rectify_coloured(*region)
+        first = self._measure_matte(expected, coloured)
+        if first is None:
+            return
+        # The follower begins where this was measured.
+        measured = [first]
+
+        def measure(expected: Expected) -> Measurement:
+            if measured:
+                return measured.pop()
+            matte = self._measure_matte(expected, coloured)
+            return matte or self._meter.measure_on_model(expected)
+
         fit = Follower(self._meter, measure=measure).follow(frame, pose, skips_samples=True)
         if fit is not None:
             yield fit
 
-    def _measure(self, expected: Expected, coloured: RectifiedPair) -> Measurement:
+    def _measure_matte(self, expected: Expected, coloured: RectifiedPair) -> Measurement | None:
+        """With what pictures without highlights say; None where these say nothing else."""
         support_px, box = expected.support_px, expected.pair.box
-        found = refine_on_model(expected.pair, support_px)
         matte = make_matte_pair(replace(coloured, box=box), np.isfinite(support_px))
-        if matte is not None:
-            without = refine_on_model(matte, support_px)
-            if are_highlights_seen(found, without):
-                found = join_maps(found, without)
-        return self._meter.take_on_model(expected, found)
+        if matte is None:
+            return None
+        found, without = (refine_on_model(one, support_px) for one in (expected.pair, matte))
+        # What was filled was not measured.
+        without = without.only(~find_clipped(coloured.left[box.slices]))
+        if not are_highlights_seen(found, without):
+            return None
+        return self._meter.take_on_model(expected, join_maps(found, without), _CORRELATION_PX)
 
 
 def are_highlights_seen(grey: DisparityMap, matte: DisparityMap) -> bool:
@@ -90,7 +106,7 @@ def join_maps(grey: DisparityMap, matte: DisparityMap) -> DisparityMap:
     has_matte = matte.origin > 0
     return DisparityMap(
         np.where(has_matte, matte.disparity_px, grey.disparity_px),
-        np.where(has_matte, matte.sigma_px, _GREY_ALONE * grey.sigma_px),
+        np.where(has_matte, _MATTE_ALONE * matte.sigma_px, _GREY_ALONE * grey.sigma_px),
         np.where(has_matte, matte.origin, grey.origin),
         grey.x,
         grey.y,

@@ -19,11 +19,11 @@ def a_map(disparity_px: list[float], sigma_px: float) -> DisparityMap:
     return DisparityMap(values, np.full_like(values, sigma_px), origin, 3, 4)
 
 
-def test_what_is_seen_without_highlights_counts_and_grey_alone_claims_less() -> None:
+def test_what_is_seen_without_highlights_counts_and_both_claim_less() -> None:
     grey, matte = a_map([10.0, 11.0, np.nan, np.nan], 0.1), a_map([10.2, np.nan, 12.0, np.nan], 0.2)
     joined = join_maps(grey, matte)
     assert np.allclose(joined.disparity_px, [[10.2, 11.0, 12.0, np.nan]], equal_nan=True)
-    assert np.allclose(joined.sigma_px[0, :3], [0.2, 0.17, 0.2])
+    assert np.allclose(joined.sigma_px[0, :3], [1.5 * 0.2, 2.0 * 0.1, 1.5 * 0.2])
     assert (joined.origin > 0).tolist() == [[True, True, True, False]]
     assert (joined.x, joined.y) == (3, 4)
 
