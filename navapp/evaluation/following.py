@@ -35,10 +35,11 @@ _BUDGET_EVERY = 5
 
 
 class Follower:
-    """The operator of a test: registers, accepts what is found, and does nothing more.
+    """The operator of a test: registers, accepts what is OK, and does nothing more.
 
-    What the judge calls lost is rejected and searched for again in the next frame; with
-    `follows_refused` it is left under review and followed, and never accepted.
+    What is not OK is rejected and searched for again in the next frame; the last search is accepted
+    if it is not lost. With `follows_refused` all but a lost one is accepted, and a lost one is left
+    under review and followed.
     """
 
     def __init__(self, *, follows_refused: bool) -> None:
@@ -54,10 +55,12 @@ class Follower:
             return [Register()]
         if snapshot.state is not SessionState.REVIEW:
             return []
-        is_lost = snapshot.verdict is None or snapshot.verdict.status is Status.LOST
-        if is_lost and self._follows_refused:
+        status = Status.LOST if snapshot.verdict is None else snapshot.verdict.status
+        if status is Status.LOST and self._follows_refused:
             return []
-        return [(Reject if is_lost else Accept)(snapshot.candidate_id)]
+        is_last = self._follows_refused or self.n_registrations == _MOST_REGISTRATIONS
+        is_enough = status is Status.OK or (is_last and status is not Status.LOST)
+        return [(Accept if is_enough else Reject)(snapshot.candidate_id)]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
