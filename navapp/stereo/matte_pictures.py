@@ -26,12 +26,16 @@ _CLIPPED = 254
 # Of the weights by which clipped pixels are filled (standard deviation).
 _FILL_PX = 2.0
 _LEAST_WEIGHT = 1e-3
+# Windows reach beyond a box, which follows the bone by a few pixels.
+_AROUND_PX = 24
 
 
 def make_matte_pair(
     pair: RectifiedPair, is_asked: NDArray[np.bool_], blue: float = 1.0
 ) -> RectifiedPair | None:
     """Both pictures as red less blue, (H, W) uint8; None without colour.
+
+    Only in the rows of its box, and some around it; the other rows are 0.
 
     Args:
         pair: BGR in the tone curve of sRGB, or grey.
@@ -40,28 +44,35 @@ def make_matte_pair(
     """
     if pair.left.ndim != 3 or not is_asked.any():
         return None
-    left, right = (_red_less_blue(picture, blue) for picture in (pair.left, pair.right))
-    most = float(np.quantile(left[pair.box.slices][is_asked], _MOST_SHARE))
+    box = pair.box
+    first, last = max(box.y - _AROUND_PX, 0), box.y + box.height + _AROUND_PX
+    left, right = (_red_less_blue(one[first:last], blue) for one in (pair.left, pair.right))
+    inside = left[box.y - first :, box.x :][: box.height, : box.width]
+    most = float(np.quantile(inside[is_asked], _MOST_SHARE))
     if most < _LEAST_DIFFERENCE:
         return None
     gain = _MOST_VALUE / most
-    return replace(pair, left=_scale(left, gain), right=_scale(right, gain))
+    pictures = np.zeros((2, *pair.left.shape[:2]), dtype=np.uint8)
+    pictures[0, first:last], pictures[1, first:last] = _scale(left, gain), _scale(right, gain)
+    return replace(pair, left=pictures[0], right=pictures[1])
 
 
 def find_clipped(picture: Image) -> NDArray[np.bool_]:
     """(H, W) pixels of which a channel is clipped."""
-    is_clipped = picture >= _CLIPPED
-    return np.asarray(is_clipped if picture.ndim == 2 else is_clipped.any(axis=2))
+    if picture.ndim == 2:
+        return np.asarray(picture >= _CLIPPED)
+    blue, green, red = (picture[:, :, channel] >= _CLIPPED for channel in range(3))
+    return np.asarray(blue | green | red)
 
 
 def _red_less_blue(picture: Image, blue: float) -> NDArray[np.float32]:
     import cv2
 
     light = _light_of_value()
-    red, less = light[picture[:, :, 2]], np.float32(blue) * light[picture[:, :, 0]]
+    red, less = cv2.LUT(picture[:, :, 2], light), cv2.LUT(picture[:, :, 0], light)
     # Resampling has mixed clipped pixels into their neighbours.
     is_mixed = cv2.dilate(find_clipped(picture).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-    return _fill(red - less, is_mixed)
+    return _fill(np.asarray(red - np.float32(blue) * less), is_mixed)
 
 
 def _fill(values: NDArray[np.float32], is_unknown: NDArray[np.bool_]) -> NDArray[np.float32]:
@@ -78,8 +89,10 @@ def _fill(values: NDArray[np.float32], is_unknown: NDArray[np.bool_]) -> NDArray
 
 
 def _scale(difference: NDArray[np.float32], gain: float) -> Image:
-    scaled = np.clip(np.rint(gain * difference), 0.0, 255.0)
-    return np.asarray(scaled, dtype=np.uint8)
+    import cv2
+
+    # Rounds, and clips to what fits.
+    return np.asarray(cv2.convertScaleAbs(np.maximum(difference, 0.0), alpha=gain), dtype=np.uint8)
 
 
 @lru_cache(maxsize=1)

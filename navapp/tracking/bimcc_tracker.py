@@ -121,6 +121,11 @@ class BimccTracker(Tracker):
     ) -> TrackedFrame:
         """The bone near the start of a frame; `predicted` as of `judge_fits`."""
         with self.begin_checks(frame) as checks:
+            if state.is_glossy:
+                # What is mirrored will lead astray again.
+                best = self._judge_matte(frame, frame.start, goal, predicted, checks)
+                if best.verdict.status is Status.OK:
+                    return best
             # Measure on the model (section 3.2.2, algorithm 2) and fit (equations 4 to 9), in
             # turns; check beside the fit; judge.
             frame = replace(frame, on_measured=checks.check)
@@ -157,9 +162,21 @@ class BimccTracker(Tracker):
         is_worth_it = self._looks_again and is_worth_a_second_look(answer.verdict)
         if pose is None or not is_worth_it:
             return answer
-        fits = self.highlights.find(frame, self.rectify_pose(pose))
-        again = self.judge_fits(frame, fits, goal, predicted, checks=checks)
+        again = self._judge_matte(frame, self.rectify_pose(pose), goal, predicted, checks)
         return again if again.verdict.status is Status.OK else answer
+
+    def _judge_matte(
+        self,
+        frame: Frame,
+        pose: RigidTransform,
+        goal: Goal,
+        predicted: RigidTransform,
+        checks: PairChecks | None,
+    ) -> TrackedFrame:
+        """The bone near a pose, in pictures without highlights; lost where none are seen."""
+        fits = self.highlights.find(frame, pose)
+        answer = self.judge_fits(frame, fits, goal, predicted, checks=checks)
+        return replace(answer, is_matte=True)
 
     def find_for_glance(self, frame: Frame) -> Iterable[Fit | None]:
         """Where the model itself rests next to the start; nothing is measured around it."""

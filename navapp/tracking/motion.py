@@ -39,6 +39,7 @@ class TrackState:
     # (6,) by how much the velocity has changed from frame to frame of late; it fades.
     velocity_change: FloatArray = field(default_factory=lambda: np.zeros(6))
     cause: Reason | None = None  # what was found to be wrong for good, until a frame is OK
+    is_glossy: bool = False  # the newest pose was measured without highlights
 
     @classmethod
     def at_rest(
@@ -112,6 +113,7 @@ class TrackState:
             box=self.box,
             velocity_change=self._change_to(velocity),
             cause=verdict.cause,
+            is_glossy=tracked.is_matte,
         )
 
     def _velocity_to(

@@ -247,6 +247,7 @@ class TrackedFrame:
     timings: FrameTimings  # of the tracker's steps
     rows: RowCheck | None = None  # what the pair says of the rig itself; None when it says nothing
     foreground: Foreground | None = None  # at the pose; None without one
+    is_matte: bool = False  # measured in pictures without highlights
 
     @property
     def left_from_bone(self) -> RigidTransform | None:

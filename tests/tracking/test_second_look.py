@@ -6,6 +6,7 @@ from dataclasses import replace
 import pytest
 
 from navapp.geometry.transform import RigidTransform
+from navapp.tracking import TrackState
 from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.tracking.first_registration import FirstRegistration
 from navapp.tracking.frame import Fit, Frame
@@ -54,3 +55,34 @@ def test_one_of_several_poses_is_not_made_sure_by_a_second_look() -> None:
     best, found = look_again(0.0, Reason.AMBIGUOUS)
     assert found.n_asked == 0
     assert best.verdict.reasons == (Reason.AMBIGUOUS,)
+
+
+@pytest.mark.parametrize("is_glossy", [False, True])
+def test_after_a_second_look_the_next_frame_begins_with_it(
+    is_glossy: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    a = room()
+    picture = a.frames[0]
+    tracker = BimccTracker(a.rig, a.tracker.model.bone)
+    tracker.highlights = found = Found(tracker)
+    begun: list[int] = []
+    grey = tracker.near.find
+    monkeypatch.setattr(tracker.near, "find", lambda frame: begun.append(1) or grey(frame))
+    state = TrackState.at_rest(a.truth(picture), picture.captured_ns)
+    state = replace(state, is_glossy=is_glossy)
+    tracked, after = tracker.track(picture.left, picture.right, picture.captured_ns, state, GOAL)
+    assert tracked.verdict.status is Status.OK
+    assert (len(begun), found.n_asked) == ((0, 1) if is_glossy else (1, 0))
+    assert after.is_glossy is tracked.is_matte is is_glossy
+
+
+def test_a_bone_on_which_nothing_mirrored_is_seen_is_followed_as_usual() -> None:
+    a = room()
+    picture = a.frames[0]
+    grey = replace(picture, left=picture.left[..., 1].copy(), right=picture.right[..., 1].copy())
+    tracker = BimccTracker(a.rig, a.tracker.model.bone)
+    state = TrackState.at_rest(a.truth(picture), picture.captured_ns)
+    state = replace(state, is_glossy=True)
+    tracked, after = tracker.track(grey.left, grey.right, grey.captured_ns, state, GOAL)
+    assert tracked.verdict.status is Status.OK
+    assert not after.is_glossy

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.transform import RigidTransform
@@ -28,7 +29,7 @@ _CORRELATION_PX = 22.0
 # without highlights, over those in grey. On nine matt patellas 0.58 to 0.70 and 0.96 to 1.03, on
 # glossy ones 0.72 to 1.23 and 1.13 to 1.59 (tests.bench.bone_highlights); in between. With too
 # little colour for its texture noise contradicts as well, but then fewer pixels are answered.
-_LEAST_CONTRADICTION, _LEAST_ANSWERED = 0.71, 1.08
+_LEAST_CONTRADICTION, _LEAST_ANSWERED = 0.75, 1.08
 _MAD_TO_SIGMA = 1.4826
 
 
@@ -52,7 +53,14 @@ class HighlightSearch:
         if frame.rectify_coloured is None or region is None or expected is None:
             return
         coloured = frame.rectify_coloured(*region)
-        first = self._measure_matte(expected, coloured)
+        matte = make_matte_pair(
+            replace(coloured, box=expected.pair.box), np.isfinite(expected.support_px)
+        )
+        if matte is None:
+            return
+        # What was filled was not measured.
+        is_clipped = find_clipped(coloured.left)
+        first = self._measure_matte(expected, matte, is_clipped)
         if first is None:
             return
         # The follower begins where this was measured.
@@ -61,22 +69,21 @@ class HighlightSearch:
         def measure(expected: Expected) -> Measurement:
             if measured:
                 return measured.pop()
-            matte = self._measure_matte(expected, coloured)
-            return matte or self._meter.measure_on_model(expected)
+            again = self._measure_matte(expected, matte, is_clipped)
+            return again or self._meter.measure_on_model(expected)
 
         fit = Follower(self._meter, measure=measure).follow(frame, pose, skips_samples=True)
         if fit is not None:
             yield fit
 
-    def _measure_matte(self, expected: Expected, coloured: RectifiedPair) -> Measurement | None:
+    def _measure_matte(
+        self, expected: Expected, matte: RectifiedPair, is_clipped: NDArray[np.bool_]
+    ) -> Measurement | None:
         """With what pictures without highlights say; None where these say nothing else."""
         support_px, box = expected.support_px, expected.pair.box
-        matte = make_matte_pair(replace(coloured, box=box), np.isfinite(support_px))
-        if matte is None:
-            return None
-        found, without = (refine_on_model(one, support_px) for one in (expected.pair, matte))
-        # What was filled was not measured.
-        without = without.only(~find_clipped(coloured.left[box.slices]))
+        pairs = expected.pair, replace(matte, box=box)
+        found, without = (refine_on_model(one, support_px) for one in pairs)
+        without = without.only(~is_clipped[box.slices])
         if not are_highlights_seen(found, without):
             return None
         return self._meter.take_on_model(expected, join_maps(found, without), _CORRELATION_PX)
