@@ -240,6 +240,7 @@ class _Fit:
             reasons=tuple(reasons),
             size_mm=information.size_mm,
             size_sigma_mm=information.size_sigma_mm,
+            relief_covariance=information.relief_covariance,
         )
         fits = np.flatnonzero(near.distance_mm < near.sigma_mm)
         points_mm, residual_mm = pairs.point.take(fits, axis=0), pairs.residual[fits]

@@ -1,7 +1,7 @@
 """What residuals fix and what they leave free: covariance, degeneracy, blocks of several kinds."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +37,7 @@ _MOST_FAR, _BY_CHANCE = 0.5, 1.0
 _FEWEST = 6.0
 # By how much the surface of a bone differs from its model beyond what the plan tells, along its
 # normal (standard deviation), and over which distance that goes together (tests.bench.bounds).
-RELIEF_SD_MM, RELIEF_LENGTH_MM = 0.05, 4.0
+RELIEF_SD_MM, RELIEF_LENGTH_MM = 0.033, 4.0
 # Residuals that show nothing at all (drawn data) still leave a scale.
 _LEAST_SQUARED_RATIO = 1e-4
 
@@ -56,6 +56,8 @@ class Information:
     # from its centre.
     size_mm: float = 0.0
     size_sigma_mm: float = math.inf  # standard deviation of that; infinite when nothing fixes it
+    # (6, 6) as `covariance`: what the bone's relief adds to it.
+    relief_covariance: FloatArray = field(default_factory=lambda: np.zeros((6, 6)))
 
     @property
     def is_degenerate(self) -> bool:
@@ -112,16 +114,17 @@ def compute_information(
     H, _ = sum_plane_system(pairs, n, centre_mm, lever_mm)
     change = np.diag([1.0] * 3 + [1.0 / lever_mm] * 3) @ turned
     inverse = np.linalg.inv(H)
-    covariance = n_sharing_errors * inverse
+    covariance = n_sharing_errors * change @ inverse @ change.T
+    relief = np.zeros((6, 6))
     if n_sharing_relief > 0.0:
         squared, _ = sum_plane_system(
             pairs._replace(weight=pairs.weight**2), n, centre_mm, lever_mm
         )
-        relief_mm2 = n_sharing_relief * RELIEF_SD_MM**2
-        covariance = covariance + relief_mm2 * (inverse @ squared @ inverse)
-    covariance = change @ covariance @ change.T
+        relief = n_sharing_relief * RELIEF_SD_MM**2 * (inverse @ squared @ inverse)
+        relief = change @ relief @ change.T
     size_sigma_mm = math.sqrt(n_sharing_errors * size_variance)
-    return Information(0.5 * (covariance + covariance.T), free, size_mm, size_sigma_mm)
+    covariance, relief = (0.5 * (one + one.T) for one in (covariance, relief))
+    return Information(covariance, free, size_mm, size_sigma_mm, relief)
 
 
 def _are_free(eigenvalues: FloatArray) -> NDArray[np.bool_]:

@@ -260,14 +260,16 @@ def is_bone_absent(agreement: Agreement) -> bool:
     return any(rule.status(evidence) is Status.LOST for rule in _OF_AGREEMENT)
 
 
-def is_worth_a_second_look(verdict: Verdict) -> bool:
-    """Whether highlights may be why a pose is not OK, or fits no better than it does.
+def is_little_occluded(verdict: Verdict) -> bool:
+    """Whether hardly anything lies before the bone: behind a hand highlights are not looked for."""
+    return verdict.occluded_fraction <= _LITTLE_OCCLUDED
 
-    Behind a hand they are not looked for.
-    """
-    is_open = verdict.occluded_fraction <= _LITTLE_OCCLUDED
+
+def is_worth_a_second_look(verdict: Verdict) -> bool:
+    """Whether highlights may be why a pose is not OK, or fits no better than it does."""
     fits_loosely = verdict.status is Status.OK and verdict.spread_ratio > _LOOSE_SPREAD
-    return is_open and (verdict.status is Status.DEGRADED or fits_loosely)
+    is_doubted = verdict.status is Status.DEGRADED or fits_loosely
+    return is_doubted and is_little_occluded(verdict)
 
 
 def is_place_doubted(verdict: Verdict) -> bool:

@@ -57,6 +57,14 @@ def make_matte_pair(
     return replace(pair, left=pictures[0], right=pictures[1])
 
 
+def find_filled(picture: Image) -> NDArray[np.bool_]:
+    """(H, W) pixels that `make_matte_pair` fills: clipped, or resampled from clipped ones."""
+    import cv2
+
+    is_clipped = find_clipped(picture).astype(np.uint8)
+    return np.asarray(cv2.dilate(is_clipped, np.ones((3, 3), np.uint8)) > 0)
+
+
 def find_clipped(picture: Image) -> NDArray[np.bool_]:
     """(H, W) pixels of which a channel is clipped."""
     if picture.ndim == 2:
@@ -70,9 +78,7 @@ def _red_less_blue(picture: Image, blue: float) -> NDArray[np.float32]:
 
     light = _light_of_value()
     red, less = cv2.LUT(picture[:, :, 2], light), cv2.LUT(picture[:, :, 0], light)
-    # Resampling has mixed clipped pixels into their neighbours.
-    is_mixed = cv2.dilate(find_clipped(picture).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-    return _fill(np.asarray(red - np.float32(blue) * less), is_mixed)
+    return _fill(np.asarray(red - np.float32(blue) * less), find_filled(picture))
 
 
 def _fill(values: NDArray[np.float32], is_unknown: NDArray[np.bool_]) -> NDArray[np.float32]:

@@ -10,7 +10,12 @@ from dataclasses import replace
 from navapp.geometry.rectification import Image
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
-from navapp.registration.verdict import Goal, is_place_doubted, is_worth_a_second_look
+from navapp.registration.verdict import (
+    Goal,
+    is_little_occluded,
+    is_place_doubted,
+    is_worth_a_second_look,
+)
 from navapp.tracking.checks import PairChecks
 from navapp.tracking.diagnosis import Diagnosis
 from navapp.tracking.first_registration import FirstRegistration
@@ -124,7 +129,7 @@ class BimccTracker(Tracker):
             if state.is_glossy:
                 # What is mirrored will lead astray again.
                 best = self._judge_matte(frame, frame.start, goal, predicted, checks)
-                if best.verdict.status is Status.OK:
+                if best.verdict.status is Status.OK and is_little_occluded(best.verdict):
                     return best
             # Measure on the model (section 3.2.2, algorithm 2) and fit (equations 4 to 9), in
             # turns; check beside the fit; judge.
@@ -163,7 +168,10 @@ class BimccTracker(Tracker):
         if pose is None or not is_worth_it:
             return answer
         again = self._judge_matte(frame, self.rectify_pose(pose), goal, predicted, checks)
-        return again if again.verdict.status is Status.OK else answer
+        is_looser = again.verdict.spread_ratio > answer.verdict.spread_ratio
+        if again.verdict.status is not Status.OK:
+            return answer
+        return answer if answer.verdict.status is Status.OK and is_looser else again
 
     def _judge_matte(
         self,

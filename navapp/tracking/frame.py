@@ -79,6 +79,15 @@ class Fit:
         """The same fit with one more reason against its pose."""
         return replace(self, estimate=self.estimate.with_reason(reason))
 
+    def with_relief(self, noise_variance_ratio: float) -> "Fit":
+        """The fit, what the bone's relief adds in its covariance.
+
+        That is scaled by the ratio once more, which the relief is not to be.
+        """
+        estimate = self.estimate
+        covariance = estimate.covariance + estimate.relief_covariance / noise_variance_ratio
+        return replace(self, estimate=replace(estimate, covariance=covariance))
+
     def with_correlated_residuals(self, noise_variance_ratio: float) -> "Fit":
         """The fit on the model, its covariance grown by what its residuals show beyond noise.
 

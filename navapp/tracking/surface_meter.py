@@ -38,10 +38,12 @@ FREE_CORRELATION_PX, MODEL_CORRELATION_PX = 40.0, 11.0
 _SAMPLED = replace(MODEL_REFINEMENT, n_steps=3, stops_at_rest=True, last_step_px=0.3)
 _SAMPLES_PX = 6
 # A larger gap in the answers is no highlight: something else covers the bone there. Windows that
-# reach far into it see both, and most of what covers a bone lies in front of it. They count as if
-# they were off by so many times more: in places they are all that is seen of a sawn bone.
+# reach far into it see both, and most of what covers a bone lies in front of it.
 _LARGEST_HIGHLIGHT_PX2 = 400
-_MIXED_PX, _MIXED_SIGMAS = 3, np.float32(4.0)
+_MIXED_PX = 3
+_STEEP = 0.4  # change of disparity from one pixel of a row to the next
+# Where a smaller fraction would be left, the gaps come from a pose that is still off.
+_LEAST_UNMIXED_FRACTION = 0.5
 # Poses of which the bounds are kept.
 _KEPT_BOUNDS = 8
 
@@ -239,7 +241,7 @@ class SurfaceMeter:
         Its errors go together over `correlation_px`.
         """
         is_expected = np.isfinite(expected.support_px)
-        cloud = self._cloud(doubt_gap_rims(found, is_expected))
+        cloud = self._cloud(remove_gap_rims(found, expected.support_px))
         n_expected = max(int(np.count_nonzero(is_expected)), 1)
         return self._measured_on_model(
             found, cloud, found.n_matched / n_expected, expected, correlation_px
@@ -286,14 +288,26 @@ class SurfaceMeter:
         return found.reproject(self.geometry, stride_px)
 
 
-def doubt_gap_rims(found: DisparityMap, is_expected: NDArray[np.bool_]) -> DisparityMap:
-    """With less trust in the rims of large gaps in what is expected (h, w)."""
+def remove_gap_rims(found: DisparityMap, support_px: NDArray[np.float32]) -> DisparityMap:
+    """Without the rims of large gaps in what is expected, unless that leaves too little.
+
+    Args:
+        found: on the model.
+        support_px: (h, w) disparity of the model, NaN beside it.
+    """
     import cv2
 
-    gaps = large_regions(is_expected & (found.origin == 0), _LARGEST_HIGHLIGHT_PX2, connectivity=4)
+    is_matched = found.origin > 0
+    # Where the model is as steep as this, the right camera hardly sees it: no gap.
+    steepness = np.abs(np.gradient(support_px, axis=1))
+    is_gap = (steepness < _STEEP) & ~is_matched
+    gaps = large_regions(is_gap, _LARGEST_HIGHLIGHT_PX2, connectivity=4)
     size = 2 * _MIXED_PX + 1
-    is_rim = cv2.dilate(gaps.astype(np.uint8), np.ones((size, size), np.uint8)) > 0
-    return replace(found, sigma_px=np.where(is_rim, _MIXED_SIGMAS * found.sigma_px, found.sigma_px))
+    around = cv2.dilate(gaps.astype(np.uint8), np.ones((size, size), np.uint8)) > 0
+    stays = is_matched & ~around
+    if np.count_nonzero(stays) < _LEAST_UNMIXED_FRACTION * np.count_nonzero(is_matched):
+        return found
+    return found.only(stays)
 
 
 def _spread(thin: DisparityMap, stride_px: int, shape: tuple[int, ...]) -> DisparityMap:

@@ -1,7 +1,7 @@
 """A pose, what stands behind it, and what the judge says of it."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
 import numpy as np
@@ -146,6 +146,8 @@ class PoseEstimate:
     # middle; told by the surface alone.
     size_mm: float = 0.0
     size_sigma_mm: float = math.inf  # standard deviation of that
+    # (6, 6) as `covariance`: what the bone's relief adds to it, which no model knows.
+    relief_covariance: FloatArray = field(default_factory=lambda: np.zeros((6, 6)))
 
     @property
     def has_finite_covariance(self) -> bool:

@@ -56,15 +56,20 @@ def test_points_that_share_their_errors_count_as_one() -> None:
 
 
 @pytest.mark.kernel
-def test_relief_that_neighbours_share_is_counted_beside_noise() -> None:
+def test_relief_that_neighbours_share_is_told_beside_noise() -> None:
     pairs, n, measured, _ = measured_pairs(make_case())
     weigh(pairs, n, 1.0, 2.5, 0.0)
     weight = pairs.weight[:n].copy()
     inverse = np.linalg.inv(reference.twist_information(measured, weight, POSE, CENTRE))
     squares = reference.twist_information(measured, weight**2, POSE, CENTRE)
-    expected = 9.0 * inverse + 40.0 * RELIEF_SD_MM**2 * inverse @ squares @ inverse
-    found = compute_information(pairs, n, POSE, CENTRE, 9.0, 40.0).covariance
-    np.testing.assert_allclose(found, expected, rtol=1e-4, atol=1e-6 * np.abs(expected).max())
+    expected = 40.0 * RELIEF_SD_MM**2 * inverse @ squares @ inverse
+    found = compute_information(pairs, n, POSE, CENTRE, 9.0, 40.0)
+    np.testing.assert_allclose(
+        found.relief_covariance, expected, rtol=1e-4, atol=1e-6 * np.abs(expected).max()
+    )
+    without = compute_information(pairs, n, POSE, CENTRE, 9.0)
+    np.testing.assert_array_equal(found.covariance, without.covariance)
+    assert not without.relief_covariance.any()
 
 
 def test_a_ball_leaves_three_rotations_free() -> None:

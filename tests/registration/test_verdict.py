@@ -17,6 +17,7 @@ from navapp.registration.verdict import (
     decide,
     is_bone_absent,
     is_place_doubted,
+    is_worth_a_second_look,
 )
 from navapp.tracking import Goal
 from navapp.values import FrameTimings, PoseEstimate, Reason, Status, TrackedFrame, Verdict
@@ -119,6 +120,24 @@ REASONS = {Reason.PICTURES_SWAPPED, Reason.OTHER_SIDE} | {row.reason for row in 
 def told(evidence: Evidence) -> tuple[Status, tuple[Reason, ...]]:
     verdict = decide(evidence)
     return verdict.status, verdict.reasons
+
+
+@pytest.mark.parametrize(
+    ("status", "spread_ratio", "occluded", "is_worth_it"),
+    [
+        (Status.OK, 0.69, 0.0, False),
+        (Status.OK, 0.71, 0.0, True),
+        (Status.OK, 0.71, 0.21, False),
+        (Status.DEGRADED, 0.3, 0.2, True),
+        (Status.DEGRADED, 0.9, 0.21, False),
+        (Status.LOST, 0.9, 0.0, False),
+    ],
+)
+def test_what_fits_loosely_in_the_open_is_worth_a_second_look(
+    status, spread_ratio, occluded, is_worth_it
+) -> None:
+    verdict = Verdict(status, 0.2, occluded_fraction=occluded, spread_ratio=spread_ratio)
+    assert is_worth_a_second_look(verdict) is is_worth_it
 
 
 def test_a_pose_that_nothing_speaks_against_is_ok() -> None:

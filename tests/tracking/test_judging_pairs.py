@@ -166,5 +166,6 @@ def test_rows_that_surely_disagree_widen_the_predicted_error() -> None:
     depth_mm = float((a.truth(frame).apply(a.tracker.centre_mm))[2])
     cost_mm = offset_px * depth_mm**2 / (geometry.focal_px * geometry.baseline_mm)
     expected_mm = float(np.hypot(right.predicted_tre_mm, cost_mm))
-    assert turned_by.predicted_tre_mm == pytest.approx(expected_mm, rel=0.25)
+    # The rows' residuals, which go together, cost something too.
+    assert 0.8 * expected_mm < turned_by.predicted_tre_mm < 1.4 * expected_mm
     assert turned_by.predicted_tre_mm > 1.2 * right.predicted_tre_mm

@@ -14,17 +14,24 @@ from numpy.typing import NDArray
 from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.transform import RigidTransform
 from navapp.stereo import refine_on_model
-from navapp.stereo.matte_pictures import find_clipped, make_matte_pair
+from navapp.stereo.matte_pictures import find_filled, make_matte_pair
 from navapp.tracking.following import Follower
 from navapp.tracking.frame import Fit, Frame
-from navapp.tracking.surface_meter import NEAR_BOX, NEAR_VIEW, Expected, Measurement, SurfaceMeter
+from navapp.tracking.surface_meter import (
+    FREE_CORRELATION_PX,
+    NEAR_BOX,
+    NEAR_VIEW,
+    Expected,
+    Measurement,
+    SurfaceMeter,
+)
 from navapp.values import DisparityMap
 
 # Both are off by more than they claim, over the 0.65 of grey pictures of a matt bone: pictures
 # without highlights have less texture; where they answer nothing, grey ones see the highlights.
-# What is left of these goes together over more than a window (tests.bench.bone_highlights).
+# What is left of these goes together as errors of a free measurement do. (Figures:
+# tests.bench.bone_highlights.)
 _MATTE_ALONE, _GREY_ALONE = np.float32(1.5), np.float32(2.0)
-_CORRELATION_PX = 22.0
 # Spread of the differences between both answers, over what both claim, and pixels that are answered
 # without highlights, over those in grey. On nine matt patellas 0.58 to 0.70 and 0.96 to 1.03, on
 # glossy ones 0.72 to 1.23 and 1.13 to 1.59 (tests.bench.bone_highlights); in between. With too
@@ -59,34 +66,35 @@ class HighlightSearch:
         if matte is None:
             return
         # What was filled was not measured.
-        is_clipped = find_clipped(coloured.left)
-        first = self._measure_matte(expected, matte, is_clipped)
+        is_filled = find_filled(coloured.left)
+        first = self._measure_matte(expected, matte, is_filled)
         if first is None:
             return
         # The follower begins where this was measured.
-        measured = [first]
+        begun, all_matte = iter([first]), [first]
 
         def measure(expected: Expected) -> Measurement:
-            if measured:
-                return measured.pop()
-            again = self._measure_matte(expected, matte, is_clipped)
-            return again or self._meter.measure_on_model(expected)
+            found = next(begun, None) or self._measure_matte(expected, matte, is_filled)
+            if found is None:
+                return self._meter.measure_on_model(expected)
+            all_matte.append(found)
+            return found
 
         fit = Follower(self._meter, measure=measure).follow(frame, pose, skips_samples=True)
-        if fit is not None:
+        if fit is not None and fit.measured in all_matte:
             yield fit
 
     def _measure_matte(
-        self, expected: Expected, matte: RectifiedPair, is_clipped: NDArray[np.bool_]
+        self, expected: Expected, matte: RectifiedPair, is_filled: NDArray[np.bool_]
     ) -> Measurement | None:
         """With what pictures without highlights say; None where these say nothing else."""
         support_px, box = expected.support_px, expected.pair.box
         pairs = expected.pair, replace(matte, box=box)
         found, without = (refine_on_model(one, support_px) for one in pairs)
-        without = without.only(~is_clipped[box.slices])
+        without = without.only(~is_filled[box.slices])
         if not are_highlights_seen(found, without):
             return None
-        return self._meter.take_on_model(expected, join_maps(found, without), _CORRELATION_PX)
+        return self._meter.take_on_model(expected, join_maps(found, without), FREE_CORRELATION_PX)
 
 
 def are_highlights_seen(grey: DisparityMap, matte: DisparityMap) -> bool:
