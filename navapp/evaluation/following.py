@@ -143,11 +143,12 @@ class _Judge:
         pose = None if tracked is None else tracked.left_from_bone
         is_lost = tracked is None or tracked.verdict.status is Status.LOST
         is_kept = pose is not None and (self._follows_refused or not is_lost)
-        if is_kept and self._registered_s is None:
-            self._registered_s = started_s - self._spent_s
-        self._poses.append(pose)
         is_search = self._operator.n_registrations > self._n_searches
         self._n_searches = self._operator.n_registrations
+        # A later search replaces one that was rejected.
+        if is_kept and (is_search or self._registered_s is None):
+            self._registered_s = started_s - self._spent_s
+        self._poses.append(pose)
         self._scores.append(self._score(result, is_search=is_search))
         self._spent_s += time.perf_counter() - started_s
 
