@@ -41,7 +41,6 @@ _SAMPLES_PX = 6
 # reach far into it see both, and most of what covers a bone lies in front of it.
 _LARGEST_HIGHLIGHT_PX2 = 400
 _MIXED_PX = 3
-_STEEP = 0.4  # change of disparity from one pixel of a row to the next
 # Where a smaller fraction would be left, the gaps come from a pose that is still off.
 _LEAST_UNMIXED_FRACTION = 0.5
 # Poses of which the bounds are kept.
@@ -241,7 +240,7 @@ class SurfaceMeter:
         Its errors go together over `correlation_px`.
         """
         is_expected = np.isfinite(expected.support_px)
-        cloud = self._cloud(remove_gap_rims(found, expected.support_px))
+        cloud = self._cloud(remove_gap_rims(found, is_expected))
         n_expected = max(int(np.count_nonzero(is_expected)), 1)
         return self._measured_on_model(
             found, cloud, found.n_matched / n_expected, expected, correlation_px
@@ -288,20 +287,12 @@ class SurfaceMeter:
         return found.reproject(self.geometry, stride_px)
 
 
-def remove_gap_rims(found: DisparityMap, support_px: NDArray[np.float32]) -> DisparityMap:
-    """Without the rims of large gaps in what is expected, unless that leaves too little.
-
-    Args:
-        found: on the model.
-        support_px: (h, w) disparity of the model, NaN beside it.
-    """
+def remove_gap_rims(found: DisparityMap, is_expected: NDArray[np.bool_]) -> DisparityMap:
+    """Without the rims of large gaps in what is expected (h, w), unless that leaves too little."""
     import cv2
 
     is_matched = found.origin > 0
-    # Where the model is as steep as this, the right camera hardly sees it: no gap.
-    steepness = np.abs(np.gradient(support_px, axis=1))
-    is_gap = (steepness < _STEEP) & ~is_matched
-    gaps = large_regions(is_gap, _LARGEST_HIGHLIGHT_PX2, connectivity=4)
+    gaps = large_regions(is_expected & ~is_matched, _LARGEST_HIGHLIGHT_PX2, connectivity=4)
     size = 2 * _MIXED_PX + 1
     around = cv2.dilate(gaps.astype(np.uint8), np.ones((size, size), np.uint8)) > 0
     stays = is_matched & ~around
