@@ -152,13 +152,13 @@ class BimccTracker(Tracker):
         predicted: RigidTransform,
         checks: PairChecks | None = None,
     ) -> TrackedFrame:
-        """What the same pictures say without what is mirrored in the bone, if that is OK.
+        """What the same pictures say without what is mirrored in the bone, if OK and better.
 
         Else the answer as it is: of two that are refused the first has seen more.
 
         Args:
             frame: of the answer.
-            answer: looked at again when it is DEGRADED and the bone lies in the open.
+            answer: looked at again when it is DEGRADED or fits loosely, and little hides the bone.
             goal: of the stage.
             predicted: as of `judge_fits`.
             checks: as of `judge_fits`.
@@ -168,10 +168,9 @@ class BimccTracker(Tracker):
         if pose is None or not is_worth_it:
             return answer
         again = self._judge_matte(frame, self.rectify_pose(pose), goal, predicted, checks)
-        is_looser = again.verdict.spread_ratio > answer.verdict.spread_ratio
-        if again.verdict.status is not Status.OK:
-            return answer
-        return answer if answer.verdict.status is Status.OK and is_looser else again
+        before, after = answer.verdict, again.verdict
+        is_better = before.status is not Status.OK or after.spread_ratio <= before.spread_ratio
+        return again if after.status is Status.OK and is_better else answer
 
     def _judge_matte(
         self,

@@ -3,6 +3,8 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from navapp.geometry.box import Box
 from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.transform import RigidTransform
@@ -80,13 +82,15 @@ class Fit:
         return replace(self, estimate=self.estimate.with_reason(reason))
 
     def with_relief(self, noise_variance_ratio: float) -> "Fit":
-        """The fit, what the bone's relief adds in its covariance.
+        """The fit with a covariance that counts the bone's relief as well as noise.
 
-        That is scaled by the ratio once more, which the relief is not to be.
+        Divided by the ratio, because the covariance is multiplied by it later: relief is known as
+        it is, noise as it is claimed.
         """
         estimate = self.estimate
         covariance = estimate.covariance + estimate.relief_covariance / noise_variance_ratio
-        return replace(self, estimate=replace(estimate, covariance=covariance))
+        counted = replace(estimate, covariance=covariance, relief_covariance=np.zeros((6, 6)))
+        return replace(self, estimate=counted)
 
     def with_correlated_residuals(self, noise_variance_ratio: float) -> "Fit":
         """The fit on the model, its covariance grown by what its residuals show beyond noise.

@@ -254,6 +254,7 @@ class PoseJudge:
             estimate,
             camera_from_bone=left_from_rectified @ estimate.camera_from_bone,
             covariance=turn @ estimate.covariance @ turn.T,
+            relief_covariance=turn @ estimate.relief_covariance @ turn.T,
         )
 
 

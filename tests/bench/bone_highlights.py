@@ -11,7 +11,6 @@ second look. The seeds are those that the constants were chosen on.
 """
 
 import argparse
-from collections.abc import Iterator
 from dataclasses import replace
 from unittest import mock
 
@@ -20,8 +19,7 @@ from numpy.typing import NDArray
 
 from navapp.control.stages import stage_by_name
 from navapp.evaluation.following import follow
-from navapp.evaluation.paper.cases import SAMPLES, Case, CaseTest
-from navapp.evaluation.sequence import KnownSequence, render_room
+from navapp.evaluation.sequence import KnownSequence
 from navapp.registration import RegistrationModel
 from navapp.stereo import refine_on_model
 from navapp.stereo.matte_pictures import make_matte_pair
@@ -29,6 +27,7 @@ from navapp.tracking import TrackerSettings
 from navapp.tracking.search.highlights import HighlightSearch, measure_contradiction
 from navapp.tracking.surface_meter import NEAR_BOX, NEAR_VIEW, SurfaceMeter
 from navapp.values import DisparityMap
+from tests.bench.bounds import render_knee
 
 FIRST_SEED, _FRAMES = 2_000_001, 5
 _MAD_TO_SIGMA = 1.4826
@@ -42,7 +41,11 @@ def main() -> None:
     parser.add_argument("--stage", default="patella")
     parser.add_argument("--highlights", type=float, default=1.0, help="times the usual area")
     options = parser.parse_args()
-    sequences = list(_render(options))
+    stage = stage_by_name(options.stage).name
+    sequences = [
+        render_knee(stage, "overlay", number, options.first, _FRAMES, options.highlights)
+        for number in range(options.knees)
+    ]
     spreads = [measure_spreads(one) for one in sequences]
     print("| answered by | spread over the claim, by knee |\n|---|---|")
     for name in spreads[0]:
@@ -51,18 +54,6 @@ def main() -> None:
     print("|---|---|---|---|---|---|")
     for is_on in (False, True):
         print(_follow_all(sequences, is_on=is_on))
-
-
-def _render(options: argparse.Namespace) -> Iterator[KnownSequence]:
-    samples = tuple(SAMPLES)
-    for number in range(options.knees):
-        case = Case(samples[number % len(samples)], options.stage, "overlay")
-        usual = CaseTest(case, number, options.first + number).configure()
-        simulated = usual.camera.simulated.model_copy(update={"highlights": options.highlights})
-        camera = usual.camera.model_copy(update={"simulated": simulated})
-        yield render_room(
-            usual.model_copy(update={"camera": camera}), stage_by_name(options.stage).name, _FRAMES
-        )
 
 
 def measure_spreads(sequence: KnownSequence) -> dict[str, float]:

@@ -13,9 +13,9 @@ import numpy as np
 
 from navapp.control.stages import STAGES
 from navapp.evaluation.following import follow
-from navapp.evaluation.paper.cases import SAMPLES, SITUATIONS, Case, CaseTest
+from navapp.evaluation.paper.cases import SAMPLES, SITUATIONS, Case, CaseTest, SituationName
 from navapp.evaluation.scores import FrameScore
-from navapp.evaluation.sequence import render_room
+from navapp.evaluation.sequence import KnownSequence, render_room
 
 FIRST_SEED = 2_000_301
 
@@ -45,16 +45,31 @@ def main() -> None:
     print(_row("all", "", every))
 
 
-def _judge_cell(stage: str, situation: str, options: argparse.Namespace) -> list[FrameScore]:
-    frames: list[FrameScore] = []
+def render_knee(
+    stage: str,
+    situation: SituationName,
+    number: int,
+    first_seed: int,
+    n_frames: int,
+    highlights: float,
+) -> KnownSequence:
+    """A knee as `navapp evaluate` has them; with so many times the usual area of highlights."""
     samples = tuple(SAMPLES)
+    case = Case(samples[number % len(samples)], stage, situation)
+    usual = CaseTest(case, number, first_seed + number).configure()
+    simulated = usual.camera.simulated.model_copy(update={"highlights": highlights})
+    camera = usual.camera.model_copy(update={"simulated": simulated})
+    return render_room(usual.model_copy(update={"camera": camera}), stage, n_frames)
+
+
+def _judge_cell(
+    stage: str, situation: SituationName, options: argparse.Namespace
+) -> list[FrameScore]:
+    frames: list[FrameScore] = []
     for number in range(options.knees):
-        case = Case(samples[number % len(samples)], stage, situation)  # type: ignore[arg-type]
-        usual = CaseTest(case, number, options.first + number).configure()
-        simulated = usual.camera.simulated.model_copy(update={"highlights": options.highlights})
-        camera = usual.camera.model_copy(update={"simulated": simulated})
-        configuration = usual.model_copy(update={"camera": camera})
-        sequence = render_room(configuration, stage, options.frames + 1)
+        sequence = render_knee(
+            stage, situation, number, options.first, options.frames + 1, options.highlights
+        )
         found = follow(sequence, "bimcc").followed.frames
         if options.knee_rows:
             print(_row(f"{stage} {options.first + number}", situation, found), flush=True)

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from navapp.geometry.transform import RigidTransform
-from navapp.tracking import TrackState
+from navapp.tracking import TrackState, bimcc_tracker
 from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.tracking.first_registration import FirstRegistration
 from navapp.tracking.frame import Fit, Frame
@@ -86,3 +86,34 @@ def test_a_bone_on_which_nothing_mirrored_is_seen_is_followed_as_usual() -> None
     tracked, after = tracker.track(grey.left, grey.right, grey.captured_ns, state, GOAL)
     assert tracked.verdict.status is Status.OK
     assert not after.is_glossy
+
+
+def test_behind_a_hand_what_is_seen_without_highlights_does_not_count(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    a = room()
+    picture = a.frames[0]
+    tracker = BimccTracker(a.rig, a.tracker.model.bone)
+    tracker.highlights = found = Found(tracker)
+    monkeypatch.setattr(bimcc_tracker, "is_little_occluded", lambda _: False)
+    state = TrackState.at_rest(a.truth(picture), picture.captured_ns)
+    state = replace(state, is_glossy=True)
+    tracked, _ = tracker.track(picture.left, picture.right, picture.captured_ns, state, GOAL)
+    assert found.n_asked == 1
+    assert not tracked.is_matte
+
+
+@pytest.mark.parametrize(("spread_ratio", "is_replaced"), [(0.9, True), (0.1, False)])
+def test_an_ok_answer_is_replaced_by_one_that_fits_better_alone(
+    spread_ratio: float, is_replaced: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    a = room()
+    picture = a.frames[0]
+    tracker = BimccTracker(a.rig, a.tracker.model.bone)
+    tracker.highlights = Found(tracker)
+    monkeypatch.setattr(bimcc_tracker, "is_worth_a_second_look", lambda _: True)
+    frame = tracker.begin(picture.left, picture.right, a.truth(picture), Stopwatch())
+    answer = tracker.judge.judge(frame, next(iter(tracker.near.find_on_model(frame))), GOAL)
+    assert answer.verdict.status is Status.OK
+    loose = replace(answer, verdict=replace(answer.verdict, spread_ratio=spread_ratio))
+    assert tracker.look_again(frame, loose, GOAL, frame.start).is_matte is is_replaced

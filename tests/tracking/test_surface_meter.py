@@ -1,9 +1,11 @@
 """The measured surface on the model: which of it the fit may trust."""
 
 import numpy as np
+import pytest
 
-from navapp.tracking.surface_meter import remove_gap_rims
+from navapp.tracking.surface_meter import NEAR_BOX, NEAR_VIEW, remove_gap_rims
 from navapp.values import DisparityMap
+from tests.tracking.rooms import room
 
 SHAPE = (80, 120)
 EVERYWHERE = np.ones(SHAPE, dtype=bool)
@@ -49,3 +51,16 @@ def test_where_too_little_would_be_left_all_of_it_is_trusted() -> None:
     stripes[:, 3:] = np.arange(3, SHAPE[1]) % 8 > 0
     found = found_beside(stripes)
     np.testing.assert_array_equal(remove_gap_rims(found, EVERYWHERE).origin, found.origin)
+
+
+def test_relief_goes_together_over_four_millimetres() -> None:
+    a = room()
+    picture, meter = a.frames[0], a.tracker.meter
+    pose = a.tracker.rectify_pose(a.truth(picture))
+    expected = meter.render(
+        meter.rectify(picture.left, picture.right, pose, NEAR_VIEW), pose, NEAR_BOX
+    )
+    assert expected is not None
+    measured = meter.measure_on_model(expected)
+    depth_mm = np.median(measured.cloud.points_mm[:, 2])
+    assert measured.relief_px == pytest.approx(4.0 * meter.geometry.focal_px / depth_mm)

@@ -27,15 +27,14 @@ from navapp.tracking.surface_meter import (
 )
 from navapp.values import DisparityMap
 
-# Both are off by more than they claim, over the 0.65 of grey pictures of a matt bone: pictures
-# without highlights have less texture; where they answer nothing, grey ones see the highlights.
-# What is left of these goes together as errors of a free measurement do. (Figures:
-# tests.bench.bone_highlights.)
+# How far both are off, over what they claim and over the 0.65 of grey pictures of a right pose:
+# pictures without highlights have less texture, and where they answer nothing, grey ones see the
+# highlights (tests.bench.bone_highlights).
 _MATTE_ALONE, _GREY_ALONE = np.float32(1.5), np.float32(2.0)
 # Spread of the differences between both answers, over what both claim, and pixels that are answered
-# without highlights, over those in grey. On nine matt patellas 0.58 to 0.70 and 0.96 to 1.03, on
-# glossy ones 0.72 to 1.23 and 1.13 to 1.59 (tests.bench.bone_highlights); in between. With too
-# little colour for its texture noise contradicts as well, but then fewer pixels are answered.
+# without highlights, over those in grey. On six matt patellas 0.62 to 0.68 and 0.97 to 1.01, on
+# fifteen glossy ones 0.70 to 1.20 and 1.11 to 1.40 (tests.bench.bone_highlights). With too little
+# colour for its texture noise contradicts as well, but then fewer pixels are answered.
 _LEAST_CONTRADICTION, _LEAST_ANSWERED = 0.75, 1.08
 _MAD_TO_SIGMA = 1.4826
 
@@ -71,17 +70,16 @@ class HighlightSearch:
         if first is None:
             return
         # The follower begins where this was measured.
-        begun, all_matte = iter([first]), [first]
+        begun = iter([first])
+        found: Measurement | None = None
 
         def measure(expected: Expected) -> Measurement:
+            nonlocal found
             found = next(begun, None) or self._measure_matte(expected, matte, is_filled)
-            if found is None:
-                return self._meter.measure_on_model(expected)
-            all_matte.append(found)
-            return found
+            return found or self._meter.measure_on_model(expected)
 
         fit = Follower(self._meter, measure=measure).follow(frame, pose, skips_samples=True)
-        if fit is not None and fit.measured in all_matte:
+        if fit is not None and fit.measured is found:
             yield fit
 
     def _measure_matte(
