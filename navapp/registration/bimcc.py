@@ -241,6 +241,7 @@ class _Fit:
             size_mm=information.size_mm,
             size_sigma_mm=information.size_sigma_mm,
             relief_covariance=information.relief_covariance,
+            size_twist=information.size_twist,
         )
         fits = np.flatnonzero(near.distance_mm < near.sigma_mm)
         points_mm, residual_mm = pairs.point.take(fits, axis=0), pairs.residual[fits]

@@ -58,6 +58,8 @@ class Information:
     size_sigma_mm: float = math.inf  # standard deviation of that; infinite when nothing fixes it
     # (6, 6) as `covariance`: what the bone's relief adds to it.
     relief_covariance: FloatArray = field(default_factory=lambda: np.zeros((6, 6)))
+    # (6,) public twist by which the pose would differ if the model had the size that is seen.
+    size_twist: FloatArray = field(default_factory=lambda: np.zeros(6))
 
     @property
     def is_degenerate(self) -> bool:
@@ -111,6 +113,11 @@ def compute_information(
     if size_information > _SINGULAR_FRACTION * squares:
         size_mm = (product_mm - float(mixed @ by_motion[:, 1])) / size_information
         size_variance = 1.0 / size_information
+    # The points' motion, the other way. Growth about the seen centre moves the model's as well.
+    by_size, arm_mm = -by_motion[:, 0], centre_mm - seen_mm
+    turn = by_size[:3] / lever_mm
+    shift = by_size[3:] + np.cross(turn, arm_mm) + arm_mm / lever_mm
+    size_twist = size_mm * np.concatenate([pose.rotation @ shift, pose.rotation @ turn])
     H, _ = sum_plane_system(pairs, n, centre_mm, lever_mm)
     change = np.diag([1.0] * 3 + [1.0 / lever_mm] * 3) @ turned
     inverse = np.linalg.inv(H)
@@ -124,7 +131,7 @@ def compute_information(
         relief = change @ relief @ change.T
     size_sigma_mm = math.sqrt(n_sharing_errors * size_variance)
     covariance, relief = (0.5 * (one + one.T) for one in (covariance, relief))
-    return Information(covariance, free, size_mm, size_sigma_mm, relief)
+    return Information(covariance, free, size_mm, size_sigma_mm, relief, size_twist)
 
 
 def _are_free(eigenvalues: FloatArray) -> NDArray[np.bool_]:

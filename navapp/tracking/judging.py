@@ -135,11 +135,11 @@ class PoseJudge:
         view = measured.rendered
         if agreement is not None:
             # For a bone in the open, noise is taken as large as correct poses show at most, and
-            # relief is added. For a hidden one noise is taken as claimed, which is more than both:
-            # something flush with the bone may fit as well.
+            # errors of the model are added. For a hidden one noise is taken as claimed, which is
+            # more than both: something flush with the bone may fit as well.
             noise_variance_ratio = NOISE_VARIANCE_RATIO if agreement.lies_open else 1.0
             if agreement.lies_open:
-                fit = fit.with_relief(noise_variance_ratio)
+                fit = fit.with_model_error(noise_variance_ratio)
             joined = self._outline.join(frame.pair, fit, check.coarse_px, noise_variance_ratio)
             if fit.pose.mean_motion_mm(joined.pose, model.hull_mm) > _SAME_VIEW_MM:
                 agreement = None
@@ -255,6 +255,7 @@ class PoseJudge:
             camera_from_bone=left_from_rectified @ estimate.camera_from_bone,
             covariance=turn @ estimate.covariance @ turn.T,
             relief_covariance=turn @ estimate.relief_covariance @ turn.T,
+            size_twist=turn @ estimate.size_twist,
         )
 
 

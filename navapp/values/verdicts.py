@@ -148,6 +148,8 @@ class PoseEstimate:
     size_sigma_mm: float = math.inf  # standard deviation of that
     # (6, 6) as `covariance`: what the bone's relief adds to it, which no model knows.
     relief_covariance: FloatArray = field(default_factory=lambda: np.zeros((6, 6)))
+    # (6,) twist by which the pose would differ if the model had the size that is seen.
+    size_twist: FloatArray = field(default_factory=lambda: np.zeros(6))
 
     @property
     def has_finite_covariance(self) -> bool:

@@ -1,7 +1,10 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from navapp.registration import RegistrationModel, Scene, fit_bimcc
+from navapp.geometry.mesh import TriangleMesh
+from navapp.registration import BimccSettings, RegistrationModel, Scene, fit_bimcc
 from navapp.registration.information import (
     RELIEF_SD_MM,
     compute_information,
@@ -157,6 +160,26 @@ def test_the_size_of_a_bone_is_told_beside_its_pose(size: float) -> None:
     assert found.size_sigma_mm < 0.05
     # A kernel makes less of what lies far off: what is found is a little smaller.
     assert found.size_mm == pytest.approx((size - 1.0) * lever_mm, rel=0.3, abs=0.03)
+
+
+@pytest.mark.parametrize("size", [0.97, 1.03])
+def test_a_model_of_the_seen_size_would_lie_where_the_twist_says(size: float) -> None:
+    own = femur()
+    cloud = seen_cloud(own, 2500, 0.1)
+    scene = Scene(cloud.points_mm, np.zeros(3), cloud.sigma_ray_mm)
+    centre_mm = own.mesh.centroid_mm
+    grown = TriangleMesh(centre_mm + size * (own.mesh.vertices_mm - centre_mm), own.mesh.faces)
+    # A kernel so wide that all points count, however far off they are.
+    found = fit_bimcc(
+        scene, RegistrationModel(replace(own, mesh=grown)), TRUE, BimccSettings(narrowest_mm=20.0)
+    )
+    moved = found.camera_from_bone.move(found.size_twist, found.camera_from_bone.apply(centre_mm))
+    off_mm, left_mm = (
+        float(np.linalg.norm(one.apply(centre_mm) - TRUE.apply(centre_mm)))
+        for one in (found.camera_from_bone, moved)
+    )
+    assert off_mm > 0.5
+    assert left_mm < 0.3 * off_mm
 
 
 def test_one_side_of_a_plane_has_no_size() -> None:
