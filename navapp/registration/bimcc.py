@@ -238,10 +238,8 @@ class _Fit:
             iterations=iterations,
             is_converged=is_converged,
             reasons=tuple(reasons),
-            size_mm=information.size_mm,
-            size_sigma_mm=information.size_sigma_mm,
             relief_covariance=information.relief_covariance,
-            size_twist=information.size_twist,
+            sized=information.sized,
         )
         fits = np.flatnonzero(near.distance_mm < near.sigma_mm)
         points_mm, residual_mm = pairs.point.take(fits, axis=0), pairs.residual[fits]

@@ -81,26 +81,29 @@ class Fit:
         """The same fit with one more reason against its pose."""
         return replace(self, estimate=self.estimate.with_reason(reason))
 
-    def with_model_error(self, noise_variance_ratio: float) -> "Fit":
-        """The fit with a covariance that counts the model's errors as well as noise.
+    def with_relief(self, noise_variance_ratio: float) -> "Fit":
+        """The fit with a covariance that counts the bone's relief as well as noise.
 
-        They are the bone's relief, which no model knows, and another size, as far as it is seen: of
-        a plan a few per cent too large or too small, part of that moves the pose.
-
-        Divided by the ratio, because the covariance is multiplied by it later: these are known as
-        they are, noise as it is claimed.
+        Divided by the ratio, because the covariance is multiplied by it later: relief is known as
+        it is, noise as it is claimed.
         """
         estimate = self.estimate
-        by_size = np.outer(estimate.size_twist, estimate.size_twist)
-        by_model = estimate.relief_covariance + by_size
-        covariance = estimate.covariance + by_model / noise_variance_ratio
-        counted = replace(
-            estimate,
-            covariance=covariance,
-            relief_covariance=np.zeros((6, 6)),
-            size_twist=np.zeros(6),
-        )
+        covariance = estimate.covariance + estimate.relief_covariance / noise_variance_ratio
+        counted = replace(estimate, covariance=covariance, relief_covariance=np.zeros((6, 6)))
         return replace(self, estimate=counted)
+
+    def with_size(self) -> "Fit":
+        """The fit with a covariance that counts how far off the bone is in the size that is seen.
+
+        Part of a plan's wrong size moves the pose. No pose is corrected by it: the size that is
+        seen of a bone of which little is seen is rough.
+        """
+        estimate = self.estimate
+        if estimate.sized is None:
+            return self
+        twist = estimate.sized.twist
+        covariance = estimate.covariance + np.outer(twist, twist)
+        return replace(self, estimate=replace(estimate, covariance=covariance))
 
     def with_correlated_residuals(self, noise_variance_ratio: float) -> "Fit":
         """The fit on the model, its covariance grown by what its residuals show beyond noise.

@@ -135,15 +135,18 @@ class PoseJudge:
         view = measured.rendered
         if agreement is not None:
             # For a bone in the open, noise is taken as large as correct poses show at most, and
-            # errors of the model are added. For a hidden one noise is taken as claimed, which is
+            # relief and size are added. For a hidden one noise is taken as claimed, which is
             # more than both: something flush with the bone may fit as well.
-            noise_variance_ratio = NOISE_VARIANCE_RATIO if agreement.lies_open else 1.0
-            if agreement.lies_open:
-                fit = fit.with_model_error(noise_variance_ratio)
+            lies_open = agreement.lies_open
+            noise_variance_ratio = NOISE_VARIANCE_RATIO if lies_open else 1.0
+            if lies_open:
+                fit = fit.with_relief(noise_variance_ratio)
             joined = self._outline.join(frame.pair, fit, check.coarse_px, noise_variance_ratio)
             if fit.pose.mean_motion_mm(joined.pose, model.hull_mm) > _SAME_VIEW_MM:
                 agreement = None
             fit = joined.with_correlated_residuals(noise_variance_ratio)
+            if lies_open:
+                fit = fit.with_size()
         if agreement is None and fit.estimate.has_finite_covariance:
             geometry, disparity = self._meter.geometry, measured.disparity
             view = model.render(fit.pose, geometry, disparity.box)
@@ -206,7 +209,11 @@ class PoseJudge:
         motion_mm = 0.0 if times is None else times.error_mm(estimate.camera_from_bone)
         bound_mm = math.hypot(seen_error_mm, plan_mm, self._error_of_rig_mm(estimate), motion_mm)
         # Errors of a cartilage's thickness that go together look like another size.
-        size_sigma_mm = math.hypot(estimate.size_sigma_mm, plan_mm)
+        size_excess_mm = math.nan
+        if (sized := estimate.sized) is not None:
+            size_sigma_mm = math.hypot(sized.growth_sigma_mm, plan_mm)
+            size_limit_mm = max(OK_ERROR_MM, _SURE_SIGMAS * size_sigma_mm)
+            size_excess_mm = abs(sized.growth_mm) - size_limit_mm
         twist = np.zeros(6)
         if predicted is not None:
             twist = predicted.twist_to(estimate.camera_from_bone, model.centre_mm)
@@ -216,7 +223,7 @@ class PoseJudge:
             agreement=agreement,
             rms_ratio=estimate.rms_mm / estimate.expected_rms_mm,
             correlated_ratio=correlated_ratio,
-            size_excess_mm=abs(estimate.size_mm) - max(OK_ERROR_MM, _SURE_SIGMAS * size_sigma_mm),
+            size_excess_mm=size_excess_mm,
             seen_error_mm=seen_error_mm,
             plan_mm=plan_mm,
             bound_mm=math.hypot(bound_mm, known.row_error_mm),
@@ -255,7 +262,7 @@ class PoseJudge:
             camera_from_bone=left_from_rectified @ estimate.camera_from_bone,
             covariance=turn @ estimate.covariance @ turn.T,
             relief_covariance=turn @ estimate.relief_covariance @ turn.T,
-            size_twist=turn @ estimate.size_twist,
+            sized=None,
         )
 
 

@@ -17,8 +17,8 @@ from navapp.geometry.mesh_edges import ridge_edges
 from navapp.geometry.rectification import Image, RectifiedGeometry, RectifiedPair
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer import RenderedView, find_known_range
-from navapp.registration.information import ResidualBlock, join
 from navapp.registration.model import RegistrationModel
+from navapp.registration.residual_blocks import ResidualBlock, join
 from navapp.tracking.edge_kernels import measure_edge_offsets
 from navapp.tracking.frame import MODEL_SETTINGS, Fit
 from navapp.tracking.outline_kernels import Eye, Rim, find_rim, is_outline, thin_rim, warp_depth
@@ -108,8 +108,10 @@ class OutlineMeter:
             lambda: find_edges(pair.left, self._left, view.depth_mm, view.box.x),
             lambda: find_edges(pair.right, self._right, *self._warp_to_right(view)),
         )
-        offset_px, jacobian, variance, n_sharing = map(np.concatenate, zip(*both, strict=True))
-        return ResidualBlock(jacobian, offset_px, variance, n_sharing, _COMMON_SD_PX)
+        offset_px, jacobian, variance, n_sharing, arm_mm = map(
+            np.concatenate, zip(*both, strict=True)
+        )
+        return ResidualBlock(jacobian, offset_px, variance, n_sharing, _COMMON_SD_PX, arm_mm)
 
     def _warp_to_right(self, view: RenderedView) -> tuple[NDArray[np.float32], int]:
         """The view's depth as the right camera sees it, and its first column there."""
@@ -135,10 +137,8 @@ class OutlineMeter:
             is_free &= ~(beside_px > rim_px + _NEARER_PX)
         return is_free
 
-    def _linearise(
-        self, rim: Rim, eye: Eye, pose: RigidTransform
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """(N, 6) Jacobian of the offsets, (N,) their variance, (N,) how many share an error."""
+    def _linearise(self, rim: Rim, eye: Eye, pose: RigidTransform) -> tuple[FloatArray, ...]:
+        """(N, 6) Jacobian, (N,) variance, (N,) how many share an error, (N, 3) arm."""
         seen = rim.point - (eye.x_mm, 0.0, 0.0)
         per_mm = eye.focal_px / seen[:, 2]
         # The derivative of u . projection by the point; sliding along the surface changes nothing.
@@ -149,7 +149,7 @@ class OutlineMeter:
         apart = np.linalg.norm(rim.pixel[:, None] - rim.pixel[None], axis=2)
         n_sharing = (apart <= 0.5 * MODEL_CORRELATION_PX).sum(axis=1).astype(np.float64)
         jacobian = np.column_stack([slope, np.cross(arm, slope)])
-        return jacobian, _EDGE_SIGMA_PX**2 + surface_px**2, n_sharing
+        return jacobian, _EDGE_SIGMA_PX**2 + surface_px**2, n_sharing, arm
 
 
 class NoOutline:

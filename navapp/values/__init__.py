@@ -46,6 +46,7 @@ from navapp.values.timings import FrameTimings, Stopwatch
 from navapp.values.verdicts import (
     PoseEstimate,
     Reason,
+    SizedPose,
     Status,
     TrackedFrame,
     Verdict,
@@ -88,6 +89,7 @@ __all__ = [
     "RowCheck",
     "Shape",
     "Side",
+    "SizedPose",
     "Sphere",
     "StageContent",
     "StageSpec",

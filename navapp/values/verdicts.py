@@ -1,6 +1,5 @@
 """A pose, what stands behind it, and what the judge says of it."""
 
-import math
 from dataclasses import dataclass, field, replace
 from enum import Enum
 
@@ -126,6 +125,42 @@ CAUSES = (Reason.PICTURES_SWAPPED, Reason.OTHER_SIDE)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class SizedPose:
+    """Another pose of a bone: with the size of its model as a seventh unknown.
+
+    The model grows about the middle of what is seen of it.
+    """
+
+    # (7,) from the pose with the model's own size: twist as of `PoseEstimate.covariance`, growth in
+    # mm at the lever.
+    step: FloatArray
+    covariance: FloatArray  # (7, 7) of it
+    arm_mm: FloatArray  # (3,) from the middle of what is seen to the model's centre
+    lever_mm: float  # rms distance of what is seen from its middle
+
+    @property
+    def growth_mm(self) -> float:
+        """By how much the bone seems larger than its model, at the lever."""
+        return float(self.step[6])
+
+    @property
+    def growth_sigma_mm(self) -> float:
+        """Standard deviation of that."""
+        return float(np.sqrt(self.covariance[6, 6]))
+
+    @property
+    def twist(self) -> FloatArray:
+        """(6,) by which the bone lies elsewhere; growth shifts its centre as well."""
+        shift_mm = self.growth_mm / self.lever_mm * self.arm_mm
+        twist: FloatArray = self.step[:6] + np.concatenate([shift_mm, np.zeros(3)])
+        return twist
+
+    def move(self, twist: FloatArray) -> "SizedPose":
+        """The same from a pose that lies elsewhere by `-twist` (6,)."""
+        return replace(self, step=self.step + np.append(twist, 0.0))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class PoseEstimate:
     """A bone's pose and how well the measurement fixes it."""
 
@@ -142,14 +177,9 @@ class PoseEstimate:
     iterations: int  # of the solver
     is_converged: bool  # the last step was small enough
     reasons: tuple[Reason, ...] = ()  # what the solver itself has against the result
-    # by how much the bone seems larger than the model, at the rms distance of what is seen from its
-    # middle; told by the surface alone.
-    size_mm: float = 0.0
-    size_sigma_mm: float = math.inf  # standard deviation of that
     # (6, 6) as `covariance`: what the bone's relief adds to it, which no model knows.
     relief_covariance: FloatArray = field(default_factory=lambda: np.zeros((6, 6)))
-    # (6,) twist by which the pose would differ if the model had the size that is seen.
-    size_twist: FloatArray = field(default_factory=lambda: np.zeros(6))
+    sized: SizedPose | None = None  # in the size that is seen; None when nothing fixes it
 
     @property
     def has_finite_covariance(self) -> bool:

@@ -99,14 +99,13 @@ def track_sized(sequence: KnownSequence, size: float) -> Iterator[SizedFrame]:
 
 
 def _line(size: float, seed: int, frame: SizedFrame) -> str:
-    verdict, estimate = frame.tracked.verdict, frame.tracked.estimate
+    verdict = frame.tracked.verdict
     said = ", ".join(one.value for one in verdict.reasons) or "-"
     rms = (verdict.rms_mm or np.nan) / (verdict.expected_rms_mm or np.nan)
-    size_mm = np.nan if estimate is None else estimate.size_mm
     return (
         f"  {size:g} seed {seed}: {verdict.status.value} {frame.error_mm:.2f} mm, bound "
         f"{frame.bound_mm:.2f}, spread {verdict.spread_ratio:.2f}, rms {rms:.2f}, "
-        f"size {size_mm:.2f} mm, matte {frame.tracked.is_matte}, {said}"
+        f"matte {frame.tracked.is_matte}, {said}"
     )
 
 

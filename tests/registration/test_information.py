@@ -157,9 +157,9 @@ def test_the_size_of_a_bone_is_told_beside_its_pose(size: float) -> None:
     scene = Scene(TRUE.translation_mm + size * points, np.zeros(3), cloud.sigma_ray_mm)
     found = fit_bimcc(scene, RegistrationModel(own), TRUE)
     lever_mm = np.sqrt(((points - points.mean(axis=0)) ** 2).sum(axis=1).mean())
-    assert found.size_sigma_mm < 0.05
+    assert found.sized.growth_sigma_mm < 0.05
     # A kernel makes less of what lies far off: what is found is a little smaller.
-    assert found.size_mm == pytest.approx((size - 1.0) * lever_mm, rel=0.3, abs=0.03)
+    assert found.sized.growth_mm == pytest.approx((size - 1.0) * lever_mm, rel=0.3, abs=0.03)
 
 
 @pytest.mark.parametrize("size", [0.97, 1.03])
@@ -173,7 +173,7 @@ def test_a_model_of_the_seen_size_would_lie_where_the_twist_says(size: float) ->
     found = fit_bimcc(
         scene, RegistrationModel(replace(own, mesh=grown)), TRUE, BimccSettings(narrowest_mm=20.0)
     )
-    moved = found.camera_from_bone.move(found.size_twist, found.camera_from_bone.apply(centre_mm))
+    moved = found.camera_from_bone.move(found.sized.twist, found.camera_from_bone.apply(centre_mm))
     off_mm, left_mm = (
         float(np.linalg.norm(one.apply(centre_mm) - TRUE.apply(centre_mm)))
         for one in (found.camera_from_bone, moved)
@@ -187,4 +187,4 @@ def test_one_side_of_a_plane_has_no_size() -> None:
     found = compute_information(
         *pairs_on(points, np.tile([0.0, 0.0, 1.0], (400, 1))), POSE, CENTRE, 1.0
     )
-    assert found.size_sigma_mm == np.inf
+    assert found.sized is None

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from navapp.registration.information import ResidualBlock, join
+from navapp.registration.residual_blocks import ResidualBlock, join
 from navapp.values import PoseEstimate, Reason
 from tests.many import few_of
 from tests.registration.shapes import TRUE
@@ -32,7 +32,9 @@ def block_of(
     rng = np.random.default_rng(seed)
     jacobian = rng.normal(0.0, 1.0, (n, 6)) * (3.0, 3.0, 1.0, 100.0, 100.0, 100.0)
     residual = jacobian @ twist + rng.normal(0.0, noise, n) + common
-    return ResidualBlock(jacobian, residual, np.full(n, SIGMA**2), np.ones(n), COMMON_SD)
+    return ResidualBlock(
+        jacobian, residual, np.full(n, SIGMA**2), np.ones(n), COMMON_SD, np.zeros((n, 3))
+    )
 
 
 def moved_by(estimate: PoseEstimate) -> np.ndarray:

@@ -19,6 +19,7 @@ from navapp.values import (
     Origin,
     PoseEstimate,
     Reason,
+    SizedPose,
     Status,
     Stopwatch,
     Verdict,
@@ -213,7 +214,10 @@ def test_what_the_plans_surface_may_be_off_is_in_the_bound() -> None:
 
 
 def judged_with_size(size_mm: float, sigma_mm: float, model=MODEL) -> Verdict:
-    estimate = replace(estimate_on(model=model), size_mm=size_mm, size_sigma_mm=sigma_mm)
+    step = np.append(np.zeros(6), size_mm)
+    covariance = np.diag([*[1e-4] * 6, sigma_mm**2])
+    sized = SizedPose(step, covariance, np.zeros(3), lever_mm=20.0)
+    estimate = replace(estimate_on(model=model), sized=sized)
     return judged(estimate, model=model).verdict
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from navapp.geometry.transform import RigidTransform
 from navapp.registration import Scene, fit_bimcc
-from navapp.registration.information import ResidualBlock
+from navapp.registration.residual_blocks import ResidualBlock
 from navapp.tracking import Part, TrackerSettings, TrackState
 from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.tracking.frame import FREE_SETTINGS
@@ -118,7 +118,9 @@ def test_no_outline_is_the_same_as_one_of_which_nothing_is_found(monkeypatch) ->
     a = room()
     frame, _, fit = found_at_the_truth(a)
     outline = a.tracker.judge._outline
-    nothing = ResidualBlock(np.empty((0, 6)), np.empty(0), np.empty(0), np.empty(0), 0.3)
+    nothing = ResidualBlock(
+        np.empty((0, 6)), np.empty(0), np.empty(0), np.empty(0), 0.3, np.empty((0, 3))
+    )
     monkeypatch.setattr(outline, "block", lambda *_: nothing)
     for noise in (1.0, 0.4):
         expected = outline.join(frame.pair, fit, None, noise).estimate

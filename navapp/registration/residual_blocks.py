@@ -1,0 +1,195 @@
+"""Another kind of residuals joined with a fit to a surface: where both agree, and in which size."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from navapp.geometry.transform import FloatArray
+from navapp.registration.information import leaves_direction_free
+from navapp.registration.step_kernels import noise_under_kernel_mm2
+from navapp.values import PoseEstimate, Reason, SizedPose
+
+# All chosen, but where a source is named.
+# A residual further off than this, in sigma of itself and of the pose, belongs to something else.
+_GATE_SIGMAS = 3.0
+# Width of the kernel in sigma: 97 % of the efficiency of least squares (as `BimccSettings`).
+_KERNEL_SIGMAS = 2.5
+_ROUNDS = 6
+# Chi-square of 6 degrees of freedom at 95 %: blocks that pull further apart are not joined.
+_APART = 12.59
+# What a block's residuals say of its noise counts beside what it claims, which counts as so many.
+_CLAIM_COUNT = 6.0
+# Those residuals of a wrong pose that happen to be small agree with it: they must not speak for the
+# others. Of right ones most are near (`python -m tests.bench.outline`), fewer where tissue covers
+# the rim.
+_MOST_FAR, _BY_CHANCE = 0.5, 1.0
+_FEWEST = 6.0
+# Residuals that show nothing at all (drawn data) still leave a scale.
+_LEAST_SQUARED_RATIO = 1e-4
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ResidualBlock:
+    """Residuals of one kind at a pose, r = observed - predicted, and how a motion changes them."""
+
+    # (N, 6) of the prediction by the public twist: translation mm, rotation rad, from the left,
+    # about the model's centre.
+    jacobian: FloatArray
+    residual: FloatArray  # (N,) in the block's own unit
+    variance: FloatArray  # (N,) of them
+    n_sharing: FloatArray  # (N,) so many residuals, itself included, share one's error
+    common_sd: float  # standard deviation of an offset that all of them have in common
+    arm_mm: FloatArray  # (N, 3) from the model's centre to the points that they belong to
+
+    def find_near(self, covariance: FloatArray) -> NDArray[np.bool_]:
+        """(N,) residuals that a pose of that covariance allows."""
+        return self._are_near(self.jacobian, np.zeros(6), covariance)
+
+    def with_size(self, sized: SizedPose) -> FloatArray:
+        """(N, 7) as `jacobian`, with the growth of the model as in a pose of another size."""
+        grown_mm = (self.arm_mm + sized.arm_mm) / sized.lever_mm
+        return np.column_stack([self.jacobian, (self.jacobian[:, :3] * grown_mm).sum(axis=1)])
+
+    def find_near_sized(self, sized: SizedPose) -> NDArray[np.bool_]:
+        """(N,) residuals that a pose of another size allows."""
+        return self._are_near(self.with_size(sized), sized.step, sized.covariance)
+
+    def _are_near(
+        self, rows: FloatArray, step: FloatArray, covariance: FloatArray
+    ) -> NDArray[np.bool_]:
+        by_pose = ((rows @ covariance) * rows).sum(axis=1)
+        expected = self.variance + by_pose + self.common_sd**2
+        misfit = self.residual - rows @ step
+        is_near: NDArray[np.bool_] = misfit**2 < _GATE_SIGMAS**2 * expected
+        return is_near
+
+
+def join(
+    estimate: PoseEstimate,
+    kernel_sigmas: float,
+    block: ResidualBlock,
+    centre_mm: FloatArray,
+    seen_mm: FloatArray,
+    noise_variance_ratio: float = 1.0,
+) -> PoseEstimate:
+    """A pose that was fitted to a surface, moved to what it and a further block say together.
+
+    Args:
+        estimate: at its optimum; its covariance is the surface block's information.
+        kernel_sigmas: width of the kernel it was fitted with, in sigma.
+        block: linearised at that pose.
+        centre_mm: (3,) the model's centre at that pose, in the camera's frame.
+        seen_mm: (N, 3) the surface that it was fitted to, in that frame.
+        noise_variance_ratio: variance that the surface's noise has, over the one that it claims.
+
+    Returns:
+        The surface's pose when the block says too little or pulls too far away; with the reason
+        that the cues disagree when too much of the block is further off than the estimate allows.
+        A direction that the surface leaves free and the block fixes is no longer told as free.
+
+    Both blocks claim a noise and show one in their residuals. The pose is found with the noise they
+    show, so that a block that claims too much of itself does not outweigh one that claims too
+    little; the covariance is that of this pose under the noise that they have.
+
+    The pose is that of the model as it is. Which size both would have it is told beside
+    (`PoseEstimate.sized`), whether the pose is moved or not.
+
+    Source: Gauss-Newton on the sum of squares, kernel weights as in `step_kernels.weigh`; variance
+    components after Foerstner 1979; covariance of an estimator with other weights than its noise's.
+    """
+    # What the surface's residuals show of the variance that they claim, at most all of it.
+    ratio2 = max((estimate.rms_mm / estimate.expected_rms_mm) ** 2, _LEAST_SQUARED_RATIO)
+    scale = min(float(noise_under_kernel_mm2(ratio2, 1.0, kernel_sigmas)), 1.0)
+    sized = _join_size(estimate.sized, block, scale, noise_variance_ratio)
+    covariance = noise_variance_ratio * estimate.covariance
+    alone = replace(estimate, covariance=covariance, sized=sized)
+    is_near = block.find_near(estimate.covariance)
+    count = 1.0 / block.n_sharing
+    n_all, n_near = float(count.sum()), float(count[is_near].sum())
+    if n_all >= _FEWEST and n_all - n_near > _MOST_FAR * n_all + _BY_CHANCE:
+        return alone.with_reason(Reason.CUES_DISAGREE)
+    if n_near < _FEWEST:
+        return alone
+    step, covariance = _solve_joined(
+        np.zeros(6),
+        estimate.covariance,
+        scale,
+        block.jacobian,
+        block,
+        is_near,
+        noise_variance_ratio,
+    )
+    if step @ np.linalg.solve(estimate.covariance, step) > _APART:
+        return alone
+    pose = estimate.camera_from_bone.move(step, centre_mm)
+    sized, reasons = None if sized is None else sized.move(-step), estimate.reasons
+    if Reason.DEGENERATE in reasons and not leaves_direction_free(covariance, centre_mm, seen_mm):
+        reasons = tuple(reason for reason in reasons if reason is not Reason.DEGENERATE)
+    return replace(
+        estimate, camera_from_bone=pose, covariance=covariance, reasons=reasons, sized=sized
+    )
+
+
+def _join_size(
+    sized: SizedPose | None, block: ResidualBlock, surface_scale: float, noise_variance_ratio: float
+) -> SizedPose | None:
+    """The pose in another size on which both agree; the surface's where the block says little."""
+    if sized is None:
+        return None
+    is_near = block.find_near_sized(sized)
+    if float((1.0 / block.n_sharing[is_near]).sum()) < _FEWEST:
+        return replace(sized, covariance=noise_variance_ratio * sized.covariance)
+    step, covariance = _solve_joined(
+        sized.step, sized.covariance, surface_scale, block.with_size(sized), block,
+        is_near, noise_variance_ratio,
+    )  # fmt: skip
+    return replace(sized, step=step, covariance=covariance)
+
+
+def _solve_joined(
+    start: FloatArray,
+    start_covariance: FloatArray,
+    surface_scale: float,
+    rows: FloatArray,
+    block: ResidualBlock,
+    is_near: NDArray[np.bool_],
+    noise_variance_ratio: float,
+) -> tuple[FloatArray, FloatArray]:
+    """(k,) unknowns on which surface and block agree, and their (k, k) covariance.
+
+    Args:
+        start: (k,) as the surface has them.
+        start_covariance: (k, k) of them, by the surface.
+        surface_scale: variance of the surface's residuals over the one that they claim.
+        rows: (N, k) how the block's predictions grow with the unknowns.
+        block: joined.
+        is_near: (N,) residuals of it that take part.
+        noise_variance_ratio: as of `join`.
+    """
+    residual, variance = block.residual[is_near], block.variance[is_near]
+    n_sharing, k = block.n_sharing[is_near], len(start)
+    # The offset that the block's residuals have in common is one unknown more.
+    rows = np.column_stack([rows[is_near], np.ones(len(residual))])
+    surface, offset = np.zeros((k + 1, k + 1)), np.zeros((k + 1, k + 1))
+    surface[:k, :k], offset[k, k] = np.linalg.inv(start_covariance), 1.0 / block.common_sd**2
+    step: FloatArray = np.append(start, 0.0)
+    by_surface = surface @ step / surface_scale
+    for _ in range(_ROUNDS):
+        misfit = residual - rows @ step
+        count = np.exp(-0.5 * misfit**2 / (_KERNEL_SIGMAS**2 * variance)) / n_sharing
+        n, squares = float(count.sum()), float((count * misfit**2 / variance).sum())
+        # What the residuals show of their claimed variance, drawn to 1 when they are few.
+        shown = float(noise_under_kernel_mm2(squares, n, _KERNEL_SIGMAS))
+        scale = (_CLAIM_COUNT + n * shown) / (_CLAIM_COUNT + n)
+        weighted = rows.T * (count / variance)
+        information = weighted @ rows
+        normal = surface / surface_scale + offset + information / scale
+        both = by_surface + weighted @ residual / scale
+        step = np.asarray(np.linalg.solve(normal, both), dtype=np.float64)
+    inverse = np.linalg.inv(normal)
+    # A block that shows more noise than it claims is believed.
+    noise = noise_variance_ratio * surface / surface_scale**2 + offset
+    noise += information * max(scale, 1.0) / scale**2
+    covariance = (inverse @ noise @ inverse)[:k, :k]
+    return step[:k], 0.5 * (covariance + covariance.T)
