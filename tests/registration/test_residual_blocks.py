@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from navapp.registration.residual_blocks import ResidualBlock, join
-from navapp.values import PoseEstimate, Reason
+from navapp.values import PoseEstimate, Reason, SizedPose
 from tests.many import few_of
 from tests.registration.shapes import TRUE
 
@@ -175,3 +175,34 @@ def test_too_much_of_something_else_is_told() -> None:
     joined = join(SURFACE, WIDE, replace(block, residual=residual), CENTRE_MM, SEEN_MM)
     assert joined.reasons == (Reason.CUES_DISAGREE,)
     assert joined.camera_from_bone is SURFACE.camera_from_bone
+
+
+def sized_of(growth_sigma_mm: float) -> SizedPose:
+    """The surface's word on the size: nearly none, or a sure one."""
+    covariance = np.diag(np.append(SIGMAS, growth_sigma_mm) ** 2)
+    return SizedPose(np.zeros(7), covariance, np.array([0.0, 2.0, 5.0]), lever_mm=15.0)
+
+
+def test_a_block_tells_the_size_that_it_shows_and_leaves_the_pose() -> None:
+    rng = np.random.default_rng(7)
+    sized, growth_mm, n = sized_of(5.0), 0.4, 400
+    still = block_of(np.zeros(6), n=n)
+    block = replace(still, arm_mm=rng.normal(0.0, 12.0, (n, 3)))
+    block = replace(block, residual=block.residual + growth_mm * block.with_size(sized)[:, 6])
+    joined = join(replace(SURFACE, sized=sized), WIDE, block, CENTRE_MM, SEEN_MM)
+    found = joined.sized
+    assert found.growth_mm == pytest.approx(growth_mm, abs=3.0 * found.growth_sigma_mm)
+    assert found.growth_sigma_mm < 0.05
+    # In that size the bone would lie where it lies; only its centre is shifted by the growth.
+    off = moved_by(joined) + found.step[:6]
+    assert (np.abs(off) < SIGMAS).all()
+    shift_mm = found.growth_mm / 15.0 * sized.arm_mm
+    np.testing.assert_allclose(found.twist[:3], found.step[:3] + shift_mm)
+    np.testing.assert_array_equal(found.twist[3:], found.step[3:6])
+
+
+def test_without_a_block_the_size_is_the_surfaces() -> None:
+    few = block_of(drawn(1), n=5)
+    joined = join(replace(SURFACE, sized=sized_of(0.1)), WIDE, few, CENTRE_MM, SEEN_MM, 0.4)
+    assert joined.sized.growth_mm == 0.0
+    assert joined.sized.growth_sigma_mm == pytest.approx(0.1 * 0.4**0.5)

@@ -64,7 +64,7 @@ def test_the_covariance_turns_with_the_camera_frame() -> None:
 
 
 @pytest.mark.parametrize(("hidden_fraction", "noise"), [(0.0, 0.65), (0.9, 1.0)])
-def test_a_claim_is_believed_less_and_model_errors_added_while_the_bone_lies_open(
+def test_a_claim_is_believed_less_and_relief_and_size_added_while_the_bone_lies_open(
     hidden_fraction: float, noise: float
 ) -> None:
     a = room()
@@ -77,13 +77,13 @@ def test_a_claim_is_believed_less_and_model_errors_added_while_the_bone_lies_ope
     estimate = fit.estimate
     by_model = np.zeros((6, 6))
     if hidden_fraction == 0.0:
-        by_size = np.outer(estimate.size_twist, estimate.size_twist)
+        by_size = np.outer(estimate.sized.twist, estimate.sized.twist)
         by_model = estimate.relief_covariance + by_size
     expected = replace(estimate, covariance=noise**2 * estimate.covariance + by_model)
     expected_mm = expected.predict_tre_mm(a.tracker.centre_mm, targets_mm)
     assert told.verdict.predicted_tre_mm == pytest.approx(expected_mm, rel=1e-6)
     assert estimate.relief_covariance.trace() > 0.0
-    assert np.abs(estimate.size_twist).max() > 0.0
+    assert np.abs(estimate.sized.twist).max() > 0.0
 
 
 def test_a_fit_on_the_model_is_compared_where_it_was_matched_a_free_one_where_it_rests() -> None:
