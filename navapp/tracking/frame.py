@@ -7,7 +7,7 @@ import numpy as np
 
 from navapp.geometry.box import Box
 from navapp.geometry.rectification import RectifiedPair
-from navapp.geometry.transform import RigidTransform
+from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.registration import BimccSettings
 from navapp.registration.step_kernels import noise_under_kernel_mm2
 from navapp.stereo import NearerSearch
@@ -92,16 +92,20 @@ class Fit:
         counted = replace(estimate, covariance=covariance, relief_covariance=np.zeros((6, 6)))
         return replace(self, estimate=counted)
 
-    def with_size(self) -> "Fit":
+    def with_size(self, offset_mm: FloatArray) -> "Fit":
         """The fit with a covariance that counts how far off the bone is in the size that is seen.
 
-        Part of a plan's wrong size moves the pose. No pose is corrected by it: the size that is
-        seen of a bone of which little is seen is rough.
+        Part of a plan's wrong size moves the pose. The pose is not corrected by it: the size is
+        rough where little of a bone is seen.
+
+        Args:
+            offset_mm: (3,) from the model's centre to the middle of the targets, in bone
+                coordinates: growth shifts them as well.
         """
         estimate = self.estimate
         if estimate.sized is None:
             return self
-        twist = estimate.sized.twist
+        twist = estimate.sized.twist_at(self.pose.rotation @ offset_mm)
         covariance = estimate.covariance + np.outer(twist, twist)
         return replace(self, estimate=replace(estimate, covariance=covariance))
 

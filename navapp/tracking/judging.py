@@ -93,7 +93,7 @@ class PoseJudge:
         checks = checks or PairChecks(self._meter, frame.pair)
         check = checks.check(fit.measured, fit.pose).result()
         depth_mm = float(fit.pose.apply(model.centre_mm)[2])
-        fit, view, agreement = self._settle(frame, fit, check)
+        fit, view, agreement = self._settle(frame, fit, check, goal)
         evidence = self._evidence_of_pair(check.health, depth_mm)
         evidence = self._evidence_of_pose(evidence, fit, agreement, goal, predicted, frame.times)
         verdict = decide(evidence)
@@ -124,7 +124,7 @@ class PoseJudge:
         return found
 
     def _settle(
-        self, frame: Frame, fit: Fit, check: PairCheck
+        self, frame: Frame, fit: Fit, check: PairCheck, goal: Goal
     ) -> tuple[Fit, RenderedView | None, Agreement | None]:
         """The fit joined with the outline, the model seen there, and how far it agrees.
 
@@ -146,12 +146,19 @@ class PoseJudge:
                 agreement = None
             fit = joined.with_correlated_residuals(noise_variance_ratio)
             if lies_open:
-                fit = fit.with_size()
+                fit = fit.with_size(self._find_middle_mm(goal, fit) - model.centre_mm)
         if agreement is None and fit.estimate.has_finite_covariance:
             geometry, disparity = self._meter.geometry, measured.disparity
             view = model.render(fit.pose, geometry, disparity.box)
             agreement = compare(view, model, disparity, geometry, check.coarse_px)
         return fit, view, agreement
+
+    def _find_middle_mm(self, goal: Goal, fit: Fit) -> FloatArray:
+        """(3,) middle of the targets in bone coordinates; of what is seen when there are none."""
+        if len(goal.targets_mm) > 0:
+            return np.asarray(goal.targets_mm.mean(axis=0))
+        seen_mm = fit.measured.cloud.points_mm
+        return np.asarray(fit.pose.inverse().apply(seen_mm).mean(axis=0))
 
     def lost(self, reason: Reason, watch: Stopwatch) -> TrackedFrame:
         """The answer when there is no fit to judge."""

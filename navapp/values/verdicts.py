@@ -148,10 +148,13 @@ class SizedPose:
         """Standard deviation of that."""
         return float(np.sqrt(self.covariance[6, 6]))
 
-    @property
-    def twist(self) -> FloatArray:
-        """(6,) by which the bone lies elsewhere; growth shifts its centre as well."""
-        shift_mm = self.growth_mm / self.lever_mm * self.arm_mm
+    def twist_at(self, offset_mm: FloatArray) -> FloatArray:
+        """(6,) by which the bone lies elsewhere in that size; growth shifts its points as well.
+
+        Args:
+            offset_mm: (3,) from the model's centre to the point whose shift counts.
+        """
+        shift_mm = self.growth_mm / self.lever_mm * (self.arm_mm + offset_mm)
         twist: FloatArray = self.step[:6] + np.concatenate([shift_mm, np.zeros(3)])
         return twist
 

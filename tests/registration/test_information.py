@@ -173,7 +173,9 @@ def test_a_model_of_the_seen_size_would_lie_where_the_twist_says(size: float) ->
     found = fit_bimcc(
         scene, RegistrationModel(replace(own, mesh=grown)), TRUE, BimccSettings(narrowest_mm=20.0)
     )
-    moved = found.camera_from_bone.move(found.sized.twist, found.camera_from_bone.apply(centre_mm))
+    moved = found.camera_from_bone.move(
+        found.sized.twist_at(np.zeros(3)), found.camera_from_bone.apply(centre_mm)
+    )
     off_mm, left_mm = (
         float(np.linalg.norm(one.apply(centre_mm) - TRUE.apply(centre_mm)))
         for one in (found.camera_from_bone, moved)

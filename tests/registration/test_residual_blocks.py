@@ -193,12 +193,14 @@ def test_a_block_tells_the_size_that_it_shows_and_leaves_the_pose() -> None:
     found = joined.sized
     assert found.growth_mm == pytest.approx(growth_mm, abs=3.0 * found.growth_sigma_mm)
     assert found.growth_sigma_mm < 0.05
-    # In that size the bone would lie where it lies; only its centre is shifted by the growth.
+    # In that size the bone would lie where it lies; its points are shifted by the growth.
     off = moved_by(joined) + found.step[:6]
     assert (np.abs(off) < SIGMAS).all()
-    shift_mm = found.growth_mm / 15.0 * sized.arm_mm
-    np.testing.assert_allclose(found.twist[:3], found.step[:3] + shift_mm)
-    np.testing.assert_array_equal(found.twist[3:], found.step[3:6])
+    offset_mm = np.array([1.0, 0.0, -2.0])
+    shift_mm = found.growth_mm / 15.0 * (sized.arm_mm + offset_mm)
+    twist = found.twist_at(offset_mm)
+    np.testing.assert_allclose(twist[:3], found.step[:3] + shift_mm)
+    np.testing.assert_array_equal(twist[3:], found.step[3:6])
 
 
 def test_without_a_block_the_size_is_the_surfaces() -> None:
