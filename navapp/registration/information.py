@@ -127,32 +127,31 @@ def _find_sized(
     pairs: Pairs, n: int, seen: _Seen, n_sharing_errors: float, n_sharing_relief: float
 ) -> SizedPose | None:
     """The pose with the size as a seventh unknown; None when the pairs do not fix it."""
-    H, g, squares = _sum_sized_system(pairs, n, seen)
+    H, g = _sum_sized_system(pairs, n, seen)
     by_motion = np.linalg.solve(H[:6, :6], H[:6, 6])
-    if squares - H[6, :6] @ by_motion <= _SINGULAR_FRACTION * squares:
+    if H[6, 6] - H[6, :6] @ by_motion <= _SINGULAR_FRACTION * H[6, 6]:
         return None
     inverse, change = np.linalg.inv(H), seen.pose_by_points
     covariance = n_sharing_errors * inverse
     if n_sharing_relief > 0.0:
-        squared, _, _ = _sum_sized_system(pairs._replace(weight=pairs.weight**2), n, seen)
+        squared, _ = _sum_sized_system(pairs._replace(weight=pairs.weight**2), n, seen)
         covariance += n_sharing_relief * RELIEF_SD_MM**2 * (inverse @ squared @ inverse)
     covariance = change @ covariance @ change.T
+    if not 0.0 < covariance[6, 6] < math.inf:
+        return None
     step = change @ (inverse @ -g)
     return SizedPose(step, 0.5 * (covariance + covariance.T), seen.arm_mm, seen.lever_mm)
 
 
-def _sum_sized_system(pairs: Pairs, n: int, seen: _Seen) -> tuple[FloatArray, FloatArray, float]:
-    """Normal equations (7, 7), (7,) of the motion of the points and the growth of the model.
-
-    And the squares of the growth alone.
-    """
+def _sum_sized_system(pairs: Pairs, n: int, seen: _Seen) -> tuple[FloatArray, FloatArray]:
+    """Normal equations (7, 7), (7,) of the motion of the points and the growth of the model."""
     H, g = np.zeros((7, 7)), np.zeros(7)
     H[:6, :6], g[:6] = sum_plane_system(pairs, n, seen.centre_mm, seen.lever_mm)
     mixed, squares, product_mm = sum_size_terms(pairs, n, seen.centre_mm, seen.lever_mm)
     # Growth of the model brings residuals down, as growth of the points would bring them up.
     H[:6, 6] = H[6, :6] = -mixed
     H[6, 6], g[6] = squares, -product_mm
-    return H, g, squares
+    return H, g
 
 
 def _are_free(eigenvalues: FloatArray) -> NDArray[np.bool_]:

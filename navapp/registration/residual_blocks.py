@@ -46,14 +46,14 @@ class ResidualBlock:
         """(N,) residuals that a pose of that covariance allows."""
         return self._are_near(self.jacobian, np.zeros(6), covariance)
 
-    def with_size(self, sized: SizedPose) -> FloatArray:
-        """(N, 7) as `jacobian`, with the growth of the model as in a pose of another size."""
+    def sized_jacobian(self, sized: SizedPose) -> FloatArray:
+        """(N, 7) `jacobian`, and a column for the growth of the model."""
         grown_mm = (self.arm_mm + sized.arm_mm) / sized.lever_mm
         return np.column_stack([self.jacobian, (self.jacobian[:, :3] * grown_mm).sum(axis=1)])
 
     def find_near_sized(self, sized: SizedPose) -> NDArray[np.bool_]:
         """(N,) residuals that a pose of another size allows."""
-        return self._are_near(self.with_size(sized), sized.step, sized.covariance)
+        return self._are_near(self.sized_jacobian(sized), sized.step, sized.covariance)
 
     def _are_near(
         self, rows: FloatArray, step: FloatArray, covariance: FloatArray
@@ -92,8 +92,8 @@ def join(
     show, so that a block that claims too much of itself does not outweigh one that claims too
     little; the covariance is that of this pose under the noise that they have.
 
-    The pose is that of the model as it is. Which size both would have it is told beside
-    (`PoseEstimate.sized`), whether the pose is moved or not.
+    That pose is one of the model in its own size. Pose and size fitted together are told beside it
+    (`PoseEstimate.sized`), also where the block does not move the pose.
 
     Source: Gauss-Newton on the sum of squares, kernel weights as in `step_kernels.weigh`; variance
     components after Foerstner 1979; covariance of an estimator with other weights than its noise's.
@@ -123,7 +123,7 @@ def join(
     if step @ np.linalg.solve(estimate.covariance, step) > _APART:
         return alone
     pose = estimate.camera_from_bone.move(step, centre_mm)
-    sized, reasons = None if sized is None else sized.move(-step), estimate.reasons
+    sized, reasons = None if sized is None else sized.seen_from(step), estimate.reasons
     if Reason.DEGENERATE in reasons and not leaves_direction_free(covariance, centre_mm, seen_mm):
         reasons = tuple(reason for reason in reasons if reason is not Reason.DEGENERATE)
     return replace(
@@ -141,7 +141,7 @@ def _join_size(
     if float((1.0 / block.n_sharing[is_near]).sum()) < _FEWEST:
         return replace(sized, covariance=noise_variance_ratio * sized.covariance)
     step, covariance = _solve_joined(
-        sized.step, sized.covariance, surface_scale, block.with_size(sized), block,
+        sized.step, sized.covariance, surface_scale, block.sized_jacobian(sized), block,
         is_near, noise_variance_ratio,
     )  # fmt: skip
     return replace(sized, step=step, covariance=covariance)

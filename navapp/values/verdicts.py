@@ -126,7 +126,7 @@ CAUSES = (Reason.PICTURES_SWAPPED, Reason.OTHER_SIDE)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SizedPose:
-    """Another pose of a bone: with the size of its model as a seventh unknown.
+    """Pose and size of a bone, fitted together, relative to the pose with the model's own size.
 
     The model grows about the middle of what is seen of it.
     """
@@ -149,7 +149,7 @@ class SizedPose:
         return float(np.sqrt(self.covariance[6, 6]))
 
     def twist_at(self, offset_mm: FloatArray) -> FloatArray:
-        """(6,) by which the bone lies elsewhere in that size; growth shifts its points as well.
+        """(6,) twist to where a point of the bone lies in that size; growth shifts it as well.
 
         Args:
             offset_mm: (3,) from the model's centre to the point whose shift counts.
@@ -158,9 +158,9 @@ class SizedPose:
         twist: FloatArray = self.step[:6] + np.concatenate([shift_mm, np.zeros(3)])
         return twist
 
-    def move(self, twist: FloatArray) -> "SizedPose":
-        """The same from a pose that lies elsewhere by `-twist` (6,)."""
-        return replace(self, step=self.step + np.append(twist, 0.0))
+    def seen_from(self, twist: FloatArray) -> "SizedPose":
+        """The same pose and size, relative to a pose that was moved by `twist` (6,)."""
+        return replace(self, step=self.step - np.append(twist, 0.0))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -182,7 +182,8 @@ class PoseEstimate:
     reasons: tuple[Reason, ...] = ()  # what the solver itself has against the result
     # (6, 6) as `covariance`: what the bone's relief adds to it, which no model knows.
     relief_covariance: FloatArray = field(default_factory=lambda: np.zeros((6, 6)))
-    sized: SizedPose | None = None  # in the size that is seen; None when nothing fixes it
+    # with the size that is seen; inside a tracker only; None when nothing fixes the size.
+    sized: SizedPose | None = None
 
     @property
     def has_finite_covariance(self) -> bool:

@@ -188,7 +188,7 @@ def test_a_block_tells_the_size_that_it_shows_and_leaves_the_pose() -> None:
     sized, growth_mm, n = sized_of(5.0), 0.4, 400
     still = block_of(np.zeros(6), n=n)
     block = replace(still, arm_mm=rng.normal(0.0, 12.0, (n, 3)))
-    block = replace(block, residual=block.residual + growth_mm * block.with_size(sized)[:, 6])
+    block = replace(block, residual=block.residual + growth_mm * block.sized_jacobian(sized)[:, 6])
     joined = join(replace(SURFACE, sized=sized), WIDE, block, CENTRE_MM, SEEN_MM)
     found = joined.sized
     assert found.growth_mm == pytest.approx(growth_mm, abs=3.0 * found.growth_sigma_mm)
