@@ -42,22 +42,21 @@ class ResidualBlock:
     common_sd: float  # standard deviation of an offset that all of them have in common
     arm_mm: FloatArray  # (N, 3) from the model's centre to the points that they belong to
 
-    def find_near(self, covariance: FloatArray) -> NDArray[np.bool_]:
-        """(N,) residuals that a pose of that covariance allows."""
-        return self._are_near(self.jacobian, np.zeros(6), covariance)
-
     def sized_jacobian(self, sized: SizedPose) -> FloatArray:
         """(N, 7) `jacobian`, and a column for the growth of the model."""
         grown_mm = (self.arm_mm + sized.arm_mm) / sized.lever_mm
         return np.column_stack([self.jacobian, (self.jacobian[:, :3] * grown_mm).sum(axis=1)])
 
-    def find_near_sized(self, sized: SizedPose) -> NDArray[np.bool_]:
-        """(N,) residuals that a pose of another size allows."""
-        return self._are_near(self.sized_jacobian(sized), sized.step, sized.covariance)
-
-    def _are_near(
+    def find_near(
         self, rows: FloatArray, step: FloatArray, covariance: FloatArray
     ) -> NDArray[np.bool_]:
+        """(N,) residuals that the k unknowns of a pose allow.
+
+        Args:
+            rows: (N, k) how the predictions grow with the unknowns.
+            step: (k,) the unknowns.
+            covariance: (k, k) of them.
+        """
         by_pose = ((rows @ covariance) * rows).sum(axis=1)
         expected = self.variance + by_pose + self.common_sd**2
         misfit = self.residual - rows @ step
@@ -102,9 +101,8 @@ def join(
     ratio2 = max((estimate.rms_mm / estimate.expected_rms_mm) ** 2, _LEAST_SQUARED_RATIO)
     scale = min(float(noise_under_kernel_mm2(ratio2, 1.0, kernel_sigmas)), 1.0)
     sized = _join_size(estimate.sized, block, scale, noise_variance_ratio)
-    covariance = noise_variance_ratio * estimate.covariance
-    alone = replace(estimate, covariance=covariance, sized=sized)
-    is_near = block.find_near(estimate.covariance)
+    alone = replace(estimate.scale_noise(noise_variance_ratio), sized=sized)
+    is_near = block.find_near(block.jacobian, np.zeros(6), estimate.covariance)
     count = 1.0 / block.n_sharing
     n_all, n_near = float(count.sum()), float(count[is_near].sum())
     if n_all >= _FEWEST and n_all - n_near > _MOST_FAR * n_all + _BY_CHANCE:
@@ -137,13 +135,13 @@ def _join_size(
     """The pose in another size on which both agree; the surface's where the block says little."""
     if sized is None:
         return None
-    is_near = block.find_near_sized(sized)
+    rows = block.sized_jacobian(sized)
+    is_near = block.find_near(rows, sized.step, sized.covariance)
     if float((1.0 / block.n_sharing[is_near]).sum()) < _FEWEST:
-        return replace(sized, covariance=noise_variance_ratio * sized.covariance)
+        return sized.scale_noise(noise_variance_ratio)
     step, covariance = _solve_joined(
-        sized.step, sized.covariance, surface_scale, block.sized_jacobian(sized), block,
-        is_near, noise_variance_ratio,
-    )  # fmt: skip
+        sized.step, sized.covariance, surface_scale, rows, block, is_near, noise_variance_ratio
+    )
     return replace(sized, step=step, covariance=covariance)
 
 

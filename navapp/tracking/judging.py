@@ -215,9 +215,9 @@ class PoseJudge:
         seen_error_mm = self._bound_mm(estimate, goal.targets_mm, is_seen)
         motion_mm = 0.0 if times is None else times.error_mm(estimate.camera_from_bone)
         bound_mm = math.hypot(seen_error_mm, plan_mm, self._error_of_rig_mm(estimate), motion_mm)
-        # Errors of a cartilage's thickness that go together look like another size.
         size_excess_mm = math.nan
         if (sized := estimate.sized) is not None:
+            # Errors of a cartilage's thickness that go together look like another size.
             size_sigma_mm = math.hypot(sized.growth_sigma_mm, plan_mm)
             size_limit_mm = max(OK_ERROR_MM, _SURE_SIGMAS * size_sigma_mm)
             size_excess_mm = abs(sized.growth_mm) - size_limit_mm

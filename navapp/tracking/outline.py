@@ -165,8 +165,7 @@ class NoOutline:
         """The fit under the surface's own noise, as `OutlineMeter.join` leaves it without one."""
         if fit.measured.rendered is None or not fit.estimate.has_finite_covariance:
             return fit
-        covariance = noise_variance_ratio * fit.estimate.covariance
-        return replace(fit, estimate=replace(fit.estimate, covariance=covariance))
+        return replace(fit, estimate=fit.estimate.scale_noise(noise_variance_ratio))
 
 
 def _only(rim: Rim, kept: NDArray[np.bool_]) -> Rim:

@@ -158,6 +158,10 @@ class SizedPose:
         twist: FloatArray = self.step[:6] + np.concatenate([shift_mm, np.zeros(3)])
         return twist
 
+    def scale_noise(self, variance_ratio: float) -> "SizedPose":
+        """The same with a covariance so many times as large."""
+        return replace(self, covariance=variance_ratio * self.covariance)
+
     def seen_from(self, twist: FloatArray) -> "SizedPose":
         """The same pose and size, relative to a pose that was moved by `twist` (6,)."""
         return replace(self, step=self.step - np.append(twist, 0.0))
@@ -193,6 +197,11 @@ class PoseEstimate:
     def with_reason(self, reason: Reason) -> "PoseEstimate":
         """The same estimate with one more reason against it."""
         return replace(self, reasons=(*self.reasons, reason))
+
+    def scale_noise(self, variance_ratio: float) -> "PoseEstimate":
+        """The same with covariances of pose and size so many times as large."""
+        sized = None if self.sized is None else self.sized.scale_noise(variance_ratio)
+        return replace(self, covariance=variance_ratio * self.covariance, sized=sized)
 
     def predict_tre_mm(
         self, centre_mm: FloatArray, targets_mm: FloatArray, level: float = 0.95

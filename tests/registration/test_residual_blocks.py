@@ -92,7 +92,7 @@ def test_residuals_of_something_else_are_left_out() -> None:
     residual = block.residual.copy()
     residual[::8] += 6.0
     spoilt = replace(block, residual=residual)
-    assert spoilt.find_near(SURFACE.covariance)[::8].mean() < 0.05
+    assert spoilt.find_near(spoilt.jacobian, np.zeros(6), SURFACE.covariance)[::8].mean() < 0.05
     clean = moved_by(join(SURFACE, WIDE, block, CENTRE_MM, SEEN_MM))
     robust = moved_by(join(SURFACE, WIDE, spoilt, CENTRE_MM, SEEN_MM))
     assert (np.abs(robust - clean) < 0.5 * SIGMAS).all()
@@ -205,6 +205,8 @@ def test_a_block_tells_the_size_that_it_shows_and_leaves_the_pose() -> None:
 
 def test_without_a_block_the_size_is_the_surfaces() -> None:
     few = block_of(drawn(1), n=5)
-    joined = join(replace(SURFACE, sized=sized_of(0.1)), WIDE, few, CENTRE_MM, SEEN_MM, 0.4)
-    assert joined.sized.growth_mm == 0.0
+    step = np.array([0.1, 0.0, -0.2, 0.001, 0.0, 0.0, 0.3])
+    sized = replace(sized_of(0.1), step=step)
+    joined = join(replace(SURFACE, sized=sized), WIDE, few, CENTRE_MM, SEEN_MM, 0.4)
+    np.testing.assert_array_equal(joined.sized.step, step)
     assert joined.sized.growth_sigma_mm == pytest.approx(0.1 * 0.4**0.5)

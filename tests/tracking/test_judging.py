@@ -227,7 +227,11 @@ def test_a_bone_of_another_size_is_doubted_when_that_is_sure_and_costs_much(sign
     assert judged_with_size(sign * 0.6, 0.1).status is Status.DEGRADED
     assert judged_with_size(sign * 0.4, 0.1).reasons == ()
     assert judged_with_size(sign * 0.6, 0.25).reasons == ()
-    assert judged_with_size(sign * 0.6, np.inf).reasons == ()
+    assert judged_with_size(sign * 0.6, 0.25).status is Status.OK
+
+
+def test_a_bone_of_which_no_size_is_seen_is_not_doubted_for_it() -> None:
+    assert judged(replace(estimate_on(), sized=None)).verdict.reasons == ()
 
 
 def test_cartilage_that_the_plan_knows_roughly_may_look_like_another_size() -> None:

@@ -126,6 +126,8 @@ def test_no_outline_is_the_same_as_one_of_which_nothing_is_found(monkeypatch) ->
         expected = outline.join(frame.pair, fit, None, noise).estimate
         found = NoOutline().join(frame.pair, fit, None, noise).estimate
         np.testing.assert_array_equal(found.covariance, expected.covariance)
+        np.testing.assert_array_equal(found.sized.covariance, expected.sized.covariance)
+        np.testing.assert_array_equal(found.sized.step, expected.sized.step)
         np.testing.assert_array_equal(
             found.camera_from_bone.matrix, expected.camera_from_bone.matrix
         )

@@ -4,6 +4,10 @@ import pytest
 
 from tests.bench.bounds import FIRST_SEED, render_knee
 from tests.bench.wrong_sizes import SizedFrame, track_sized
+from tests.many import few_of
+
+# Edges may be off in common as much as one per cent of a patella: what is seen of its size is less.
+UNSEEN = 1.2
 
 
 def track_patella(size: float, highlights: float) -> list[SizedFrame]:
@@ -13,16 +17,15 @@ def track_patella(size: float, highlights: float) -> list[SizedFrame]:
 
 @pytest.mark.parametrize("highlights", [0.0, 1.0])
 @pytest.mark.parametrize("size", [0.99, 1.0, 1.01])
-def test_the_bound_of_a_small_bone_counts_a_size_that_is_a_little_off(
+def test_an_error_by_one_per_cent_of_size_hardly_exceeds_the_bound(
     size: float, highlights: float
 ) -> None:
     frames = track_patella(size, highlights)
     assert all(one.is_ok for one in frames)
-    # One per cent is as much as edges may be off in common: not all of it is seen as size.
-    assert max(one.error_mm / one.bound_mm for one in frames) < 1.2
+    assert max(one.error_mm / one.bound_mm for one in frames) < (1.0 if size == 1.0 else UNSEEN)
 
 
 @pytest.mark.parametrize("highlights", [0.0, 1.0])
-@pytest.mark.parametrize("size", [0.93, 0.95, 0.97, 1.03, 1.05, 1.07])
+@pytest.mark.parametrize("size", few_of([0.97, 1.03, 0.93, 0.95, 1.05, 1.07], 2))
 def test_a_small_bone_of_another_size_is_refused(size: float, highlights: float) -> None:
     assert not any(one.is_ok for one in track_patella(size, highlights))
