@@ -14,6 +14,7 @@ from navapp.values import (
     Plan,
     PoseEstimate,
     Reason,
+    SizedPose,
     Status,
     SurfaceCloud,
     TrackedFrame,
@@ -93,6 +94,60 @@ def test_a_turn_that_a_shift_undoes_leaves_its_point_without_error():
     opposite = estimate(covariance).predict_tre_mm(centre, 2 * centre - target)
     expected = 2 * np.linalg.norm(np.cross(turn, offset)) * np.sqrt(3.841)
     assert opposite == pytest.approx(expected, rel=1e-4)
+
+
+def sized_estimate():
+    """A bone that seems 3 % larger, and would lie elsewhere then."""
+    step = np.array([0.2, -0.1, 0.05, 0.004, 0.0, -0.003, 0.6])
+    sized = SizedPose(step, np.eye(7), np.array([3.0, -2.0, 8.0]), lever_mm=20.0)
+    return dataclasses.replace(estimate(np.diag([1e-4] * 3 + [1e-6] * 3)), sized=sized)
+
+
+def test_a_seen_size_shifts_each_point_by_itself():
+    """As a model that grows about the middle of what is seen, then moves by the twist."""
+    found = sized_estimate()
+    centre, points = np.array([5.0, 6.0, 7.0]), np.random.default_rng(3).normal(size=(6, 3)) * 30
+    middle = POSE.apply(centre) - found.sized.arm_mm
+    placed = POSE.apply(points)
+    grown = middle + 1.03 * (placed - middle)
+    twist = found.sized.step[:6]
+    moved = POSE.move(twist, POSE.apply(centre)).apply(POSE.inverse().apply(placed))
+    expected = (grown - placed) + (moved - placed)
+    offsets = placed - POSE.apply(centre)
+    np.testing.assert_allclose(found.sized.shifts_mm(offsets), expected, atol=2e-3)
+    covariances = found.predict_covariances(centre, points)
+    alone = estimate(found.covariance).predict_covariances(centre, points)
+    outer = np.einsum("ni,nj->nij", expected, expected)
+    np.testing.assert_allclose(covariances - alone, outer, atol=5e-3)
+    at_point = found.covariance_at(offsets[0]) - found.covariance
+    shift = found.sized.shifts_mm(offsets[:1])[0] - np.cross(twist[3:], offsets[0])
+    np.testing.assert_allclose(at_point, np.outer(*[np.r_[shift, twist[3:]]] * 2), atol=1e-9)
+
+
+def test_the_predicted_error_of_a_seen_size_is_that_of_one_direction():
+    found = dataclasses.replace(sized_estimate(), covariance=np.zeros((6, 6)))
+    centre, target = np.zeros(3), np.array([[30.0, -5.0, 12.0]])
+    shift = found.sized.shifts_mm(POSE.rotate(target))
+    expected = np.linalg.norm(shift) * np.sqrt(3.841)
+    assert found.predict_tre_mm(centre, target) == pytest.approx(expected, rel=1e-4)
+
+
+def test_a_turned_camera_sees_the_same_errors():
+    found = sized_estimate()
+    centre, points = np.array([5.0, 6.0, 7.0]), np.random.default_rng(3).normal(size=(6, 3)) * 30
+    rotation = rotation_from_vector([0.2, 0.5, -0.4])
+    turned = found.turn_camera(RigidTransform.from_parts("other", "left", rotation, np.zeros(3)))
+    np.testing.assert_allclose(
+        turned.predict_covariances(centre, points),
+        rotation @ found.predict_covariances(centre, points) @ rotation.T,
+        atol=1e-12,
+    )
+    assert turned.predict_tre_mm(centre, points) == pytest.approx(
+        found.predict_tre_mm(centre, points)
+    )
+    loose = dataclasses.replace(found, covariance=np.diag([np.inf] * 6))
+    assert np.isposinf(np.diag(loose.turn_camera(RigidTransform.from_parts(
+        "other", "left", rotation, np.zeros(3))).covariance)).all()  # fmt: skip
 
 
 def test_no_targets_have_no_predicted_error():

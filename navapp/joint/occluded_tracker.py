@@ -12,7 +12,7 @@ from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer import RenderedView, render_rectified
 from navapp.registration import RegistrationModel
-from navapp.registration.verdict import Agreement, Goal
+from navapp.registration.verdict import Agreement
 from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.tracking.checks import PairCheck
 from navapp.tracking.frame import NOISE_VARIANCE_RATIO, Fit, Frame
@@ -103,10 +103,10 @@ class _HiddenBoneJudge(PoseJudge):
         self._whole, self._geometry, self._spread = whole, tracker.meter.geometry, spread
 
     def _settle(
-        self, frame: Frame, fit: Fit, check: PairCheck, goal: Goal
+        self, frame: Frame, fit: Fit, check: PairCheck
     ) -> tuple[Fit, RenderedView | None, Agreement | None]:
         """As of any judge, then grown."""
-        fit, view, agreement = super()._settle(frame, fit, check, goal)
+        fit, view, agreement = super()._settle(frame, fit, check)
         covariance = fit.estimate.covariance
         if view is not None and agreement is not None and agreement.lies_open:
             whole = self._whole.render(fit.pose, self._geometry, view.box)

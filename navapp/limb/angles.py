@@ -70,5 +70,5 @@ def _deviations(
     """
     across = np.cross(up, left)
     jacobian = np.linalg.inv(np.column_stack([left, across / np.linalg.norm(across), up]))
-    covariance = femur.covariance[3:, 3:] + tibia.covariance[3:, 3:]
+    covariance = femur.rotation_covariance + tibia.rotation_covariance
     return np.sqrt(np.diag(jacobian @ covariance @ jacobian.T))

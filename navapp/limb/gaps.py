@@ -93,15 +93,13 @@ class GapMeter:
             return None
         k = int(np.argmin(heights_mm))
         gap_mm = float(heights_mm[k])
-        on_femur = femur.camera_from_bone.apply(points_mm[k])
-        on_tibia = tibia.camera_from_bone.apply(self._tibia_mm[int(nearest[k])])
-        apart_mm = on_femur - on_tibia
+        ends_mm = points_mm[k], self._tibia_mm[int(nearest[k])]
+        on_femur_mm = femur.camera_from_bone.apply(ends_mm[0])
+        apart_mm = on_femur_mm - tibia.camera_from_bone.apply(ends_mm[1])
         direction = apart_mm / max(float(np.linalg.norm(apart_mm)), 1e-9)
         variance = sum(
-            _variance(direction, point - one.camera_from_bone.apply(centre), one.covariance)
-            for point, one, centre in zip(
-                (on_femur, on_tibia), (femur, tibia), centres_mm, strict=True
-            )
+            float(direction @ one.predict_covariances(centre_mm, end_mm[None])[0] @ direction)
+            for one, centre_mm, end_mm in zip((femur, tibia), centres_mm, ends_mm, strict=True)
         )
         return Gap(gap_mm, SIZE_95 * float(np.sqrt(variance + surface_sd_mm**2)))
 
@@ -141,9 +139,3 @@ def cover_with_points(mesh: TriangleMesh) -> tuple[FloatArray, FloatArray]:
         points_mm.append(np.einsum("ks,tsd->tkd", inner, corners_mm[fine]).reshape(-1, 3))
         normals.append(np.repeat(mesh.normals[mesh.faces[fine, 0]], len(inner), axis=0))
     return np.concatenate(points_mm), np.concatenate(normals)
-
-
-def _variance(direction: FloatArray, from_centre_mm: FloatArray, covariance: FloatArray) -> float:
-    """Of a point's place along a direction, when its body moves by a twist of that covariance."""
-    jacobian = np.concatenate([direction, np.cross(from_centre_mm, direction)])
-    return float(jacobian @ covariance @ jacobian)

@@ -24,6 +24,8 @@ _TURN_FRACTION = 0.1
 # By how much the surface of a bone differs from its model beyond what the plan tells, along its
 # normal (standard deviation), and over which distance that goes together (tests.bench.bounds).
 RELIEF_SD_MM, RELIEF_LENGTH_MM = 0.033, 4.0
+# Standard deviation of a model's size before anything is seen of it.
+_SIZE_SD = 0.05
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,7 +40,7 @@ class Information:
     free: FloatArray
     # (6, 6) as `covariance`: what the bone's relief adds to it.
     relief_covariance: FloatArray = field(default_factory=lambda: np.zeros((6, 6)))
-    sized: SizedPose | None = None  # None when the pairs fix no size
+    sized: SizedPose | None = None  # of pairs that know the relief and fix a pose
 
     @property
     def is_degenerate(self) -> bool:
@@ -69,7 +71,7 @@ def compute_information(
 
     Pairs and the model's centre (3,) are in bone coordinates. So many neighbouring pairs as
     `n_sharing_errors` have their errors in common, and so many as `n_sharing_relief` the relief by
-    which the bone differs from its model.
+    which the bone differs from its model; where that is told, the size is as well.
 
     Source: Gauss-Newton normal equations at the solution; their inverse is the covariance. That of
     the relief is the one of an estimator whose weights do not know it.
@@ -85,20 +87,17 @@ def compute_information(
     if eigenvalues[0] <= _SINGULAR_FRACTION * eigenvalues[-1]:
         return Information(np.diag([np.inf] * 6), free)
     seen = _Seen(seen_mm, lever_mm, pose.rotation, pose.rotation @ (centre_mm - seen_mm))
-    sized = _find_sized(pairs, n, seen, n_sharing_errors, n_sharing_relief)
     H, _ = sum_plane_system(pairs, n, centre_mm, lever_mm)
     change = np.diag([1.0] * 3 + [1.0 / lever_mm] * 3) @ turned
     inverse = np.linalg.inv(H)
     covariance = n_sharing_errors * change @ inverse @ change.T
-    relief = np.zeros((6, 6))
-    if n_sharing_relief > 0.0:
-        squared, _ = sum_plane_system(
-            pairs._replace(weight=pairs.weight**2), n, centre_mm, lever_mm
-        )
-        relief = n_sharing_relief * RELIEF_SD_MM**2 * (inverse @ squared @ inverse)
-        relief = change @ relief @ change.T
-    covariance, relief = (0.5 * (one + one.T) for one in (covariance, relief))
-    return Information(covariance, free, relief, sized)
+    covariance = 0.5 * (covariance + covariance.T)
+    if n_sharing_relief <= 0.0:
+        return Information(covariance, free)
+    squared, _ = sum_plane_system(pairs._replace(weight=pairs.weight**2), n, centre_mm, lever_mm)
+    relief = n_sharing_relief * RELIEF_SD_MM**2 * change @ inverse @ squared @ inverse @ change.T
+    sized = _find_sized(pairs, n, seen, n_sharing_errors, n_sharing_relief)
+    return Information(covariance, free, 0.5 * (relief + relief.T), sized)
 
 
 class _Seen(NamedTuple):
@@ -125,22 +124,16 @@ class _Seen(NamedTuple):
 
 def _find_sized(
     pairs: Pairs, n: int, seen: _Seen, n_sharing_errors: float, n_sharing_relief: float
-) -> SizedPose | None:
-    """The pose with the size as a seventh unknown; None when the pairs do not fix it."""
+) -> SizedPose:
+    """The pose with the size as a seventh unknown; where the pairs do not fix it, as expected."""
     H, g = _sum_sized_system(pairs, n, seen)
-    by_motion = np.linalg.solve(H[:6, :6], H[:6, 6])
-    if H[6, 6] - H[6, :6] @ by_motion <= _SINGULAR_FRACTION * H[6, 6]:
-        return None
+    H[6, 6] += n_sharing_errors / (_SIZE_SD * seen.lever_mm) ** 2
     inverse, change = np.linalg.inv(H), seen.pose_by_points
-    covariance = n_sharing_errors * inverse
-    if n_sharing_relief > 0.0:
-        squared, _ = _sum_sized_system(pairs._replace(weight=pairs.weight**2), n, seen)
-        covariance += n_sharing_relief * RELIEF_SD_MM**2 * (inverse @ squared @ inverse)
-    covariance = change @ covariance @ change.T
-    if not 0.0 < covariance[6, 6] < math.inf:
-        return None
-    step = change @ (inverse @ -g)
-    return SizedPose(step, 0.5 * (covariance + covariance.T), seen.arm_mm, seen.lever_mm)
+    covariance = n_sharing_errors * change @ inverse @ change.T
+    squared, _ = _sum_sized_system(pairs._replace(weight=pairs.weight**2), n, seen)
+    relief = n_sharing_relief * RELIEF_SD_MM**2 * change @ inverse @ squared @ inverse @ change.T
+    covariance, relief = (0.5 * (one + one.T) for one in (covariance, relief))
+    return SizedPose(change @ (inverse @ -g), covariance, seen.arm_mm, seen.lever_mm, relief)
 
 
 def _sum_sized_system(pairs: Pairs, n: int, seen: _Seen) -> tuple[FloatArray, FloatArray]:

@@ -1,6 +1,7 @@
 """Another kind of residuals joined with a fit to a surface: where both agree, and in which size."""
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,19 +50,42 @@ class ResidualBlock:
 
     def find_near(
         self, rows: FloatArray, step: FloatArray, covariance: FloatArray
-    ) -> NDArray[np.bool_]:
-        """(N,) residuals that the k unknowns of a pose allow.
+    ) -> "NearResiduals":
+        """Which residuals the k unknowns of a pose allow.
 
         Args:
             rows: (N, k) how the predictions grow with the unknowns.
             step: (k,) the unknowns.
             covariance: (k, k) of them.
         """
-        by_pose = ((rows @ covariance) * rows).sum(axis=1)
-        expected = self.variance + by_pose + self.common_sd**2
-        misfit = self.residual - rows @ step
-        is_near: NDArray[np.bool_] = misfit**2 < _GATE_SIGMAS**2 * expected
-        return is_near
+        by_unknowns = ((rows @ covariance) * rows).sum(axis=1)
+        expected = self.variance + by_unknowns + self.common_sd**2
+        is_near = (self.residual - rows @ step) ** 2 < _GATE_SIGMAS**2 * expected
+        count = 1.0 / self.n_sharing
+        return NearResiduals(
+            is_near, expected[is_near], float(count.sum()), float(count[is_near].sum())
+        )
+
+
+class NearResiduals(NamedTuple):
+    """Those of a block's residuals that a pose allows."""
+
+    is_near: NDArray[np.bool_]  # (N,)
+    expected_variance: FloatArray  # (M,) of those that are, with that of the pose
+    # of residuals with errors of their own: all, and those that are near.
+    n_all: float
+    n_near: float
+
+    @property
+    def is_few(self) -> bool:
+        """Whether they are too few to say anything."""
+        return self.n_near < _FEWEST
+
+    @property
+    def is_other(self) -> bool:
+        """Whether too many are not: most are of something else than the model at that pose."""
+        n_far = self.n_all - self.n_near
+        return self.n_all >= _FEWEST and n_far > _MOST_FAR * self.n_all + _BY_CHANCE
 
 
 def join(
@@ -100,24 +124,15 @@ def join(
     # What the surface's residuals show of the variance that they claim, at most all of it.
     ratio2 = max((estimate.rms_mm / estimate.expected_rms_mm) ** 2, _LEAST_SQUARED_RATIO)
     scale = min(float(noise_under_kernel_mm2(ratio2, 1.0, kernel_sigmas)), 1.0)
-    sized = _join_size(estimate.sized, block, scale, noise_variance_ratio)
+    surface = _Surface(np.zeros(6), estimate.covariance, scale, noise_variance_ratio)
+    sized = None if estimate.sized is None else _join_size(estimate.sized, surface, block)
     alone = replace(estimate.scale_noise(noise_variance_ratio), sized=sized)
-    is_near = block.find_near(block.jacobian, np.zeros(6), estimate.covariance)
-    count = 1.0 / block.n_sharing
-    n_all, n_near = float(count.sum()), float(count[is_near].sum())
-    if n_all >= _FEWEST and n_all - n_near > _MOST_FAR * n_all + _BY_CHANCE:
+    near = block.find_near(block.jacobian, surface.step, surface.covariance)
+    if near.is_other:
         return alone.with_reason(Reason.CUES_DISAGREE)
-    if n_near < _FEWEST:
+    if near.is_few:
         return alone
-    step, covariance = _solve_joined(
-        np.zeros(6),
-        estimate.covariance,
-        scale,
-        block.jacobian,
-        block,
-        is_near,
-        noise_variance_ratio,
-    )
+    step, covariance = _solve_joined(surface, block.jacobian, block, near)
     if step @ np.linalg.solve(estimate.covariance, step) > _APART:
         return alone
     pose = estimate.camera_from_bone.move(step, centre_mm)
@@ -129,65 +144,64 @@ def join(
     )
 
 
-def _join_size(
-    sized: SizedPose | None, block: ResidualBlock, surface_scale: float, noise_variance_ratio: float
-) -> SizedPose | None:
+class _Surface(NamedTuple):
+    """What the surface says of k unknowns."""
+
+    step: FloatArray  # (k,)
+    covariance: FloatArray  # (k, k)
+    scale: float  # variance of its residuals over the one that they claim
+    noise_variance_ratio: float  # as of `join`
+
+
+def _join_size(sized: SizedPose, of_pose: _Surface, block: ResidualBlock) -> SizedPose:
     """The pose in another size on which both agree; the surface's where the block says little."""
-    if sized is None:
-        return None
+    surface = of_pose._replace(step=sized.step, covariance=sized.covariance)
     rows = block.sized_jacobian(sized)
-    is_near = block.find_near(rows, sized.step, sized.covariance)
-    if float((1.0 / block.n_sharing[is_near]).sum()) < _FEWEST:
-        return sized.scale_noise(noise_variance_ratio)
-    step, covariance = _solve_joined(
-        sized.step, sized.covariance, surface_scale, rows, block, is_near, noise_variance_ratio
-    )
+    near = block.find_near(rows, surface.step, surface.covariance)
+    if near.is_few or near.is_other:
+        return sized.scale_noise(surface.noise_variance_ratio)
+    step, covariance = _solve_joined(surface, rows, block, near)
     return replace(sized, step=step, covariance=covariance)
 
 
 def _solve_joined(
-    start: FloatArray,
-    start_covariance: FloatArray,
-    surface_scale: float,
-    rows: FloatArray,
-    block: ResidualBlock,
-    is_near: NDArray[np.bool_],
-    noise_variance_ratio: float,
+    surface: _Surface, rows: FloatArray, block: ResidualBlock, near: NearResiduals
 ) -> tuple[FloatArray, FloatArray]:
     """(k,) unknowns on which surface and block agree, and their (k, k) covariance.
 
     Args:
-        start: (k,) as the surface has them.
-        start_covariance: (k, k) of them, by the surface.
-        surface_scale: variance of the surface's residuals over the one that they claim.
+        surface: says so much of the unknowns.
         rows: (N, k) how the block's predictions grow with the unknowns.
         block: joined.
-        is_near: (N,) residuals of it that take part.
-        noise_variance_ratio: as of `join`.
+        near: those of its residuals that take part.
     """
-    residual, variance = block.residual[is_near], block.variance[is_near]
-    n_sharing, k = block.n_sharing[is_near], len(start)
+    residual, variance = block.residual[near.is_near], block.variance[near.is_near]
+    n_sharing, k = block.n_sharing[near.is_near], len(surface.step)
     # The offset that the block's residuals have in common is one unknown more.
-    rows = np.column_stack([rows[is_near], np.ones(len(residual))])
-    surface, offset = np.zeros((k + 1, k + 1)), np.zeros((k + 1, k + 1))
-    surface[:k, :k], offset[k, k] = np.linalg.inv(start_covariance), 1.0 / block.common_sd**2
-    step: FloatArray = np.append(start, 0.0)
-    by_surface = surface @ step / surface_scale
+    rows = np.column_stack([rows[near.is_near], np.ones(len(residual))])
+    known, offset = np.zeros((k + 1, k + 1)), np.zeros((k + 1, k + 1))
+    known[:k, :k], offset[k, k] = np.linalg.inv(surface.covariance), 1.0 / block.common_sd**2
+    step: FloatArray = np.append(surface.step, 0.0)
+    by_surface = known @ step / surface.scale
+    # At first the unknowns may be off by as much as the surface leaves open: a kernel as narrow as
+    # the block's own noise would let none of its residuals speak.
+    kernel_variance = near.expected_variance
     for _ in range(_ROUNDS):
         misfit = residual - rows @ step
-        count = np.exp(-0.5 * misfit**2 / (_KERNEL_SIGMAS**2 * variance)) / n_sharing
-        n, squares = float(count.sum()), float((count * misfit**2 / variance).sum())
+        count = np.exp(-0.5 * misfit**2 / (_KERNEL_SIGMAS**2 * kernel_variance)) / n_sharing
+        n, squares = float(count.sum()), float((count * misfit**2 / kernel_variance).sum())
         # What the residuals show of their claimed variance, drawn to 1 when they are few.
         shown = float(noise_under_kernel_mm2(squares, n, _KERNEL_SIGMAS))
         scale = (_CLAIM_COUNT + n * shown) / (_CLAIM_COUNT + n)
         weighted = rows.T * (count / variance)
         information = weighted @ rows
-        normal = surface / surface_scale + offset + information / scale
+        normal = known / surface.scale + offset + information / scale
         both = by_surface + weighted @ residual / scale
         step = np.asarray(np.linalg.solve(normal, both), dtype=np.float64)
+        kernel_variance = variance
     inverse = np.linalg.inv(normal)
     # A block that shows more noise than it claims is believed.
-    noise = noise_variance_ratio * surface / surface_scale**2 + offset
+    noise = surface.noise_variance_ratio * known / surface.scale**2 + offset
     noise += information * max(scale, 1.0) / scale**2
     covariance = (inverse @ noise @ inverse)[:k, :k]
     return step[:k], 0.5 * (covariance + covariance.T)

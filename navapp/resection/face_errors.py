@@ -60,7 +60,8 @@ def make_face(
         ],
         axis=1,
     )
-    covariance = by_fit @ fit.covariance @ by_fit.T + by_pose @ estimate.covariance @ by_pose.T
+    of_pose = estimate.covariance_at(left_from_bone.apply(planned.point_mm) - centre_mm)
+    covariance = by_fit @ fit.covariance @ by_fit.T + by_pose @ of_pose @ by_pose.T
     covariance += np.diag(_common_sd(left_from_bone, bone, quality) ** 2)
     return MeasuredFace(planned, value, covariance, seen_share)
 

@@ -75,11 +75,9 @@ class HoleMeter:
     ) -> FloatArray:
         """(3, 3) of offset and diameter by what pictures may share: pose, plan, rig, shading."""
         pose, bone = estimate.camera_from_bone, self._bone
-        centre_mm = pose.apply(bone.mesh.centroid_mm[None])[0]
-        seen_mm = pose.apply(entry_mm[None])[0]
+        by_pose = estimate.predict_covariances(bone.mesh.centroid_mm, entry_mm[None])[0]
         across = planned.axes @ pose.rotation.T
-        jacobian = np.hstack([across, np.cross(seen_mm - centre_mm, across)])
         common_mm = find_common_sd_mm(pose, bone, self._rig.quality)
         covariance = _COMMON_SD_MM**2 * np.diag([1.0, 1.0, 4.0])
-        covariance[:2, :2] += jacobian @ estimate.covariance @ jacobian.T + common_mm**2 * np.eye(2)
+        covariance[:2, :2] += across @ by_pose @ across.T + common_mm**2 * np.eye(2)
         return covariance

@@ -76,7 +76,7 @@ def place_on_bone(
     turn = bone_from_left.rotation
     axis, axis_bound_deg = seen.axis, None
     if axis is not None:
-        turns = float(np.linalg.eigvalsh(estimate.covariance[3:, 3:])[-1])
+        turns = float(np.linalg.eigvalsh(estimate.rotation_covariance)[-1])
         axis_bound_deg = float(np.degrees(np.hypot(seen.axis_bound_rad, angle_bound_rad(turns))))
         axis = bone_from_left.rotate(axis)
     in_left = seen.tip_covariance_mm2 + of_bone

@@ -154,7 +154,9 @@ class BimccTracker(Tracker):
     ) -> TrackedFrame:
         """What the same pictures say without what is mirrored in the bone, if OK and better.
 
-        Else the answer as it is: of two that are refused the first has seen more.
+        Else the answer as it is: of two that are refused the first has seen more. One that surely
+        saw another size stays: highlights do not make a bone look larger, and what is left without
+        them shows less of its size.
 
         Args:
             frame: of the answer.
@@ -165,7 +167,7 @@ class BimccTracker(Tracker):
         """
         pose = answer.left_from_bone
         is_worth_it = self._looks_again and is_worth_a_second_look(answer.verdict)
-        if pose is None or not is_worth_it:
+        if pose is None or not is_worth_it or Reason.SIZE_DIFFERS in answer.verdict.reasons:
             return answer
         again = self._judge_matte(frame, self.rectify_pose(pose), goal, predicted, checks)
         before, after = answer.verdict, again.verdict

@@ -100,6 +100,7 @@ class FirstRegistration:
         if not _is_ok(answers):
             buried = self._judge_buried(frame, measured, goal)
             answers = sorted([buried, *answers], key=lambda one: one.verdict.rank)
+            answers = self._look_again(frame, answers, goal)
         frame.on_progress(1.0)
         return answers
 

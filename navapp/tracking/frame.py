@@ -3,11 +3,9 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from navapp.geometry.box import Box
 from navapp.geometry.rectification import RectifiedPair
-from navapp.geometry.transform import FloatArray, RigidTransform
+from navapp.geometry.transform import RigidTransform
 from navapp.registration import BimccSettings
 from navapp.registration.step_kernels import noise_under_kernel_mm2
 from navapp.stereo import NearerSearch
@@ -84,30 +82,10 @@ class Fit:
     def with_relief(self, noise_variance_ratio: float) -> "Fit":
         """The fit with a covariance that counts the bone's relief as well as noise.
 
-        Divided by the ratio, because the covariance is multiplied by it later: relief is known as
-        it is, noise as it is claimed.
+        Divided by the ratio, because the covariances are multiplied by it later: relief is known
+        as it is, noise as it is claimed.
         """
-        estimate = self.estimate
-        covariance = estimate.covariance + estimate.relief_covariance / noise_variance_ratio
-        counted = replace(estimate, covariance=covariance, relief_covariance=np.zeros((6, 6)))
-        return replace(self, estimate=counted)
-
-    def with_size(self, offset_mm: FloatArray) -> "Fit":
-        """The fit with a covariance that counts how far off the bone is in the size that is seen.
-
-        Part of a plan's wrong size moves the pose. The pose is not corrected by it: the size is
-        rough where little of a bone is seen.
-
-        Args:
-            offset_mm: (3,) from the model's centre to the middle of the targets, in bone
-                coordinates: growth shifts them as well.
-        """
-        estimate = self.estimate
-        if estimate.sized is None:
-            return self
-        twist = estimate.sized.twist_at(self.pose.rotation @ offset_mm)
-        covariance = estimate.covariance + np.outer(twist, twist)
-        return replace(self, estimate=replace(estimate, covariance=covariance))
+        return replace(self, estimate=self.estimate.with_relief(1.0 / noise_variance_ratio))
 
     def with_correlated_residuals(self, noise_variance_ratio: float) -> "Fit":
         """The fit on the model, its covariance grown by what its residuals show beyond noise.

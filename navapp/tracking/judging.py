@@ -93,7 +93,7 @@ class PoseJudge:
         checks = checks or PairChecks(self._meter, frame.pair)
         check = checks.check(fit.measured, fit.pose).result()
         depth_mm = float(fit.pose.apply(model.centre_mm)[2])
-        fit, view, agreement = self._settle(frame, fit, check, goal)
+        fit, view, agreement = self._settle(frame, fit, check)
         evidence = self._evidence_of_pair(check.health, depth_mm)
         evidence = self._evidence_of_pose(evidence, fit, agreement, goal, predicted, frame.times)
         verdict = decide(evidence)
@@ -124,7 +124,7 @@ class PoseJudge:
         return found
 
     def _settle(
-        self, frame: Frame, fit: Fit, check: PairCheck, goal: Goal
+        self, frame: Frame, fit: Fit, check: PairCheck
     ) -> tuple[Fit, RenderedView | None, Agreement | None]:
         """The fit joined with the outline, the model seen there, and how far it agrees.
 
@@ -135,7 +135,7 @@ class PoseJudge:
         view = measured.rendered
         if agreement is not None:
             # For a bone in the open, noise is taken as large as correct poses show at most, and
-            # relief and size are added. For a hidden one noise is taken as claimed, which is
+            # relief is added. For a hidden one noise is taken as claimed, which is
             # more than both: something flush with the bone may fit as well.
             lies_open = agreement.lies_open
             noise_variance_ratio = NOISE_VARIANCE_RATIO if lies_open else 1.0
@@ -145,20 +145,11 @@ class PoseJudge:
             if fit.pose.mean_motion_mm(joined.pose, model.hull_mm) > _SAME_VIEW_MM:
                 agreement = None
             fit = joined.with_correlated_residuals(noise_variance_ratio)
-            if lies_open:
-                fit = fit.with_size(self._find_middle_mm(goal, fit) - model.centre_mm)
         if agreement is None and fit.estimate.has_finite_covariance:
             geometry, disparity = self._meter.geometry, measured.disparity
             view = model.render(fit.pose, geometry, disparity.box)
             agreement = compare(view, model, disparity, geometry, check.coarse_px)
         return fit, view, agreement
-
-    def _find_middle_mm(self, goal: Goal, fit: Fit) -> FloatArray:
-        """(3,) middle of the targets in bone coordinates; of what is seen when there are none."""
-        if len(goal.targets_mm) > 0:
-            return np.asarray(goal.targets_mm.mean(axis=0))
-        seen_mm = fit.measured.cloud.points_mm
-        return np.asarray(fit.pose.inverse().apply(seen_mm).mean(axis=0))
 
     def lost(self, reason: Reason, watch: Stopwatch) -> TrackedFrame:
         """The answer when there is no fit to judge."""
@@ -262,15 +253,7 @@ class PoseJudge:
 
     def _unrectify(self, estimate: PoseEstimate) -> PoseEstimate:
         """The same estimate in the left camera before rectification: a pure rotation."""
-        left_from_rectified = self._meter.geometry.rectified_from_left.inverse()
-        turn = np.kron(np.eye(2), left_from_rectified.rotation)
-        return replace(
-            estimate,
-            camera_from_bone=left_from_rectified @ estimate.camera_from_bone,
-            covariance=turn @ estimate.covariance @ turn.T,
-            relief_covariance=turn @ estimate.relief_covariance @ turn.T,
-            sized=None,
-        )
+        return estimate.turn_camera(self._meter.geometry.rectified_from_left.inverse())
 
 
 def _check_rows(health: StereoHealth, evidence: Evidence, verdict: Verdict) -> RowCheck | None:

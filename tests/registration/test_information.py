@@ -148,13 +148,18 @@ def test_a_single_point_fixes_one_direction_of_six() -> None:
     assert not np.isfinite(np.diag(found.covariance)).any()
 
 
+def on_model(points_mm: np.ndarray, sigma_ray_mm: np.ndarray) -> Scene:
+    """Points that know the relief, as those that were measured on a model."""
+    return Scene(points_mm, np.zeros(3), sigma_ray_mm, n_sharing_relief=1.0)
+
+
 @pytest.mark.parametrize("size", [0.97, 1.0, 1.03])
 def test_the_size_of_a_bone_is_told_beside_its_pose(size: float) -> None:
     """At the rms distance of what is seen from its middle, in mm."""
     own = femur()
     cloud = seen_cloud(own, 2500, 0.1)
     points = cloud.points_mm - TRUE.translation_mm
-    scene = Scene(TRUE.translation_mm + size * points, np.zeros(3), cloud.sigma_ray_mm)
+    scene = on_model(TRUE.translation_mm + size * points, cloud.sigma_ray_mm)
     found = fit_bimcc(scene, RegistrationModel(own), TRUE)
     lever_mm = np.sqrt(((points - points.mean(axis=0)) ** 2).sum(axis=1).mean())
     assert found.sized.growth_sigma_mm < 0.05
@@ -166,7 +171,7 @@ def test_the_size_of_a_bone_is_told_beside_its_pose(size: float) -> None:
 def test_a_model_of_the_seen_size_would_lie_where_the_twist_says(size: float) -> None:
     own = femur()
     cloud = seen_cloud(own, 2500, 0.1)
-    scene = Scene(cloud.points_mm, np.zeros(3), cloud.sigma_ray_mm)
+    scene = on_model(cloud.points_mm, cloud.sigma_ray_mm)
     centre_mm = own.mesh.centroid_mm
     grown = TriangleMesh(centre_mm + size * (own.mesh.vertices_mm - centre_mm), own.mesh.faces)
     # A kernel so wide that all points count, however far off they are.
@@ -186,7 +191,16 @@ def test_a_model_of_the_seen_size_would_lie_where_the_twist_says(size: float) ->
 
 def test_one_side_of_a_plane_has_no_size() -> None:
     points = np.random.default_rng(1).uniform(-20.0, 20.0, (400, 3)) * (1.0, 1.0, 0.0)
-    found = compute_information(
-        *pairs_on(points, np.tile([0.0, 0.0, 1.0], (400, 1))), POSE, CENTRE, 1.0
-    )
-    assert found.sized is None
+    bent = np.tile([0.0, 0.0, 1.0], (400, 1))
+    bent[:, :2] = np.random.default_rng(2).normal(0.0, 1e-3, (400, 2))
+    found = compute_information(*pairs_on(points, bent), POSE, CENTRE, 1.0, 1.0)
+    # As before anything was seen: some per cent at the lever.
+    assert found.sized.growth_mm == pytest.approx(0.0, abs=1e-6)
+    assert found.sized.growth_sigma_mm == pytest.approx(0.05 * found.sized.lever_mm, rel=0.05)
+
+
+def test_a_free_measurement_tells_no_size() -> None:
+    mesh = blob_mesh()
+    pairs = pairs_on(mesh.vertices_mm, mesh.normals)
+    assert compute_information(*pairs, POSE, CENTRE, 1.0).sized is None
+    assert compute_information(*pairs, POSE, CENTRE, 1.0, 2.0).sized is not None

@@ -92,7 +92,9 @@ def test_residuals_of_something_else_are_left_out() -> None:
     residual = block.residual.copy()
     residual[::8] += 6.0
     spoilt = replace(block, residual=residual)
-    assert spoilt.find_near(spoilt.jacobian, np.zeros(6), SURFACE.covariance)[::8].mean() < 0.05
+    near = spoilt.find_near(spoilt.jacobian, np.zeros(6), SURFACE.covariance)
+    assert near.is_near[::8].mean() < 0.05
+    assert near.n_near == near.is_near.sum() == len(near.expected_variance)
     clean = moved_by(join(SURFACE, WIDE, block, CENTRE_MM, SEEN_MM))
     robust = moved_by(join(SURFACE, WIDE, spoilt, CENTRE_MM, SEEN_MM))
     assert (np.abs(robust - clean) < 0.5 * SIGMAS).all()
@@ -201,6 +203,42 @@ def test_a_block_tells_the_size_that_it_shows_and_leaves_the_pose() -> None:
     twist = found.twist_at(offset_mm)
     np.testing.assert_allclose(twist[:3], found.step[:3] + shift_mm)
     np.testing.assert_array_equal(twist[3:], found.step[3:6])
+
+
+@pytest.mark.parametrize("growth_mm", [-0.65, 0.65])
+def test_a_rim_speaks_where_the_surface_tells_a_wrong_size(growth_mm: float) -> None:
+    """A ring of edges in the model's own size; the surface is more than two deviations off."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 120, endpoint=False)
+    outward = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(120)])
+    arm_mm, slope_px = 15.0 * outward, 5.0 * outward
+    noise = np.random.default_rng(8).normal(0.0, SIGMA, 120)
+    ring = ResidualBlock(
+        np.column_stack([slope_px, np.cross(arm_mm, slope_px)]),
+        noise,
+        np.full(120, SIGMA**2),
+        np.full(120, 6.0),
+        COMMON_SD,
+        arm_mm,
+    )
+    step = np.append(np.zeros(6), growth_mm)
+    modest = estimate_of(SURFACE.covariance, rms_ratio=0.5)
+    surface = replace(modest, sized=replace(sized_of(0.25), step=step, arm_mm=np.zeros(3)))
+    found = join(surface, WIDE, ring, CENTRE_MM, SEEN_MM).sized
+    # What all edges may have in common looks like a size.
+    assert abs(found.growth_mm) < 2.0 * COMMON_SD / 5.0
+    assert found.growth_sigma_mm < 1.5 * COMMON_SD / 5.0
+
+
+def test_a_block_of_something_else_does_not_tell_the_size() -> None:
+    block = block_of(np.zeros(6))
+    residual = block.residual.copy()
+    residual[np.arange(len(residual)) % 5 < 3] += 6.0
+    sized = sized_of(0.1)
+    joined = join(
+        replace(SURFACE, sized=sized), WIDE, replace(block, residual=residual), CENTRE_MM, SEEN_MM
+    )
+    assert joined.reasons == (Reason.CUES_DISAGREE,)
+    np.testing.assert_array_equal(joined.sized.covariance, sized.covariance)
 
 
 def test_without_a_block_the_size_is_the_surfaces() -> None:

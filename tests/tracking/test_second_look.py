@@ -57,6 +57,34 @@ def test_one_of_several_poses_is_not_made_sure_by_a_second_look() -> None:
     assert best.verdict.reasons == (Reason.AMBIGUOUS,)
 
 
+def test_what_surely_saw_another_size_is_not_overturned_by_a_second_look() -> None:
+    best, found = look_again(0.0, Reason.SIZE_DIFFERS)
+    assert found.n_asked == 0
+    assert best.verdict.reasons == (Reason.SIZE_DIFFERS,)
+
+
+def test_what_the_search_for_a_buried_bone_finds_is_looked_at_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The right pose of a glossy bone may be found by it alone."""
+    a = room()
+    picture = a.frames[0]
+    tracker = BimccTracker(a.rig, a.tracker.model.bone)
+    tracker.highlights = Found(tracker)
+    registration = FirstRegistration(tracker)
+    frame = tracker.begin(picture.left, picture.right, a.truth(picture), Stopwatch())
+    fit = next(iter(tracker.near.find_on_model(frame)))
+    right = tracker.judge.judge(frame, fit, GOAL)
+    verdict = replace(right.verdict, status=Status.DEGRADED, reasons=(Reason.SURFACE_MISFIT,))
+    doubted = replace(right, verdict=verdict)
+    nothing = tracker.judge.lost(Reason.NO_SURFACE, frame.watch)
+    monkeypatch.setattr(registration, "_judge_distinct", lambda *_: [nothing])
+    monkeypatch.setattr(registration, "_judge_buried", lambda *_: doubted)
+    best, *_ = registration._register_around(frame, GOAL)
+    assert best.is_matte
+    assert best.verdict.status is Status.OK
+
+
 @pytest.mark.parametrize("is_glossy", [False, True])
 def test_after_a_second_look_the_next_frame_begins_with_it(
     is_glossy: bool, monkeypatch: pytest.MonkeyPatch
