@@ -1,4 +1,4 @@
-"""Bar charts after the paper's figures 5 and 6: processing time and error by situation."""
+"""Bar charts: ours by stage; time and error by situation, after the paper's figures 5 and 6."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from calibration.report.plots import draw_svg
-from navapp.evaluation.paper.cases import SITUATIONS, SituationName
+from navapp.evaluation.paper.cases import SITUATIONS, STAGE_NAMES, SituationName
 from navapp.evaluation.paper.published import Published, find_published
 from navapp.evaluation.paper.rows import Row
 from navapp.geometry.transform import FloatArray
@@ -24,8 +24,47 @@ _SHORT: dict[SituationName, str] = {
     "patient": "patient moves",
     "instrument": "instrument moves",
 }
+_SITUATION_COLOURS = ("#2b6cb0", "#63b3ed", "#c05621", "#f6ad55")
 # What the method has lost would hide all others.
 _MOST_MM = 2.0
+
+
+def draw_stages(rows: Sequence[Row]) -> str:
+    """TRE of what our judge calls OK, and how much that is, by stage and situation; SVG.
+
+    Bars are means over the samples, lines reach from the best to the worst sample.
+    """
+
+    def draw(figure: Any) -> None:
+        errors, shares = figure.subplots(1, 2)
+        _draw_by_stage(errors, rows, lambda row: row.tre_mm)
+        errors.set(ylabel="TRE of OK frames, mm, mean")
+        _draw_by_stage(shares, rows, lambda row: 100.0 * row.ok_share)
+        shares.set(ylabel="OK, % of frames", ylim=(0.0, 100.0))
+        figure.legend(
+            *errors.get_legend_handles_labels(), frameon=False, ncols=4, loc="outside upper center"
+        )
+
+    return draw_svg(draw, (9.6, 3.2))
+
+
+def _draw_by_stage(axes: Any, rows: Sequence[Row], value_of: Callable[[Row], float | None]) -> None:
+    for number, (situation, colour) in enumerate(zip(SITUATIONS, _SITUATION_COLOURS, strict=True)):
+        for place, stage in enumerate(STAGE_NAMES):
+            values = [
+                value
+                for row in rows
+                if (row.method, row.case.stage, row.case.situation) == ("bimcc", stage, situation)
+                and (value := value_of(row)) is not None
+            ]
+            at = place + 0.2 * (number - 1.5)
+            if not values:
+                axes.text(at, 0.0, "none", ha="center", va="bottom", fontsize=6, rotation=90)
+                continue
+            label = _SHORT[situation] if place == 0 else None
+            axes.bar(at, np.mean(values), 0.18, color=colour, label=label)
+            axes.plot((at, at), (min(values), max(values)), color="black", linewidth=0.8)
+    axes.set_xticks(np.arange(len(STAGE_NAMES)), STAGE_NAMES)
 
 
 def draw_rates(rows: Sequence[Row]) -> str:

@@ -6,7 +6,7 @@ from html import escape
 
 from calibration.report.page import make_html, make_note
 from navapp.evaluation.paper.cases import Case
-from navapp.evaluation.paper.charts import draw_errors, draw_rates
+from navapp.evaluation.paper.charts import draw_errors, draw_rates, draw_stages
 from navapp.evaluation.paper.rows import Row
 from navapp.evaluation.paper.tables import format_mm
 
@@ -31,6 +31,7 @@ def make_report(
         of_the_judge: HTML of its charts.
     """
     parts = [render_markdown(tables)]
+    parts += ["<h2>bimcc by stage and situation</h2>", draw_stages(rows)]
     parts += ["<h2>Processing time, as the paper's figure 5</h2>", draw_rates(rows)]
     parts += ["<h2>Error, as the paper's figure 6</h2>", draw_errors(rows)]
     parts += of_the_judge

@@ -12,6 +12,7 @@ from navapp import __version__
 from navapp.evaluation.campaign import CampaignFolder, Done
 from navapp.evaluation.judge.findings import JudgeFindings, examine_judge
 from navapp.evaluation.paper.cases import INSTRUMENT_S, SWEEP_FRAMES, Case, CaseTest
+from navapp.evaluation.paper.charts import draw_errors, draw_stages
 from navapp.evaluation.paper.report import make_report
 from navapp.evaluation.paper.rows import Row, make_row
 from navapp.evaluation.paper.settings import TableSettings
@@ -32,7 +33,7 @@ _BUDGET_COLUMNS = ("limit_mm", "ideal_mm", "matched_mm", "reached_mm")
 
 
 def write_results(folder: CampaignFolder[CaseTest], settings: TableSettings) -> dict[str, Any]:
-    """Write `tables.md`, `report.html` and `frames.csv` of what is done; the rows for programs.
+    """Write tables, report, charts and every frame of what is done; the rows for programs.
 
     Where other people's trackers were run: their rows too, and `peers.csv`.
     """
@@ -59,6 +60,8 @@ def write_results(folder: CampaignFolder[CaseTest], settings: TableSettings) -> 
     pictures = _find_pictures(folder, settings, done)
     report = make_report(tables, rows, pictures, findings.draw())
     write_whole(folder.path / "report.html", report.encode())
+    write_whole(folder.path / "stages.svg", draw_stages(rows).encode())
+    write_whole(folder.path / "errors.svg", draw_errors(rows).encode())
     write_whole(folder.path / "frames.csv", _make_csv(done).encode())
     if peers:
         write_whole(folder.path / "peers.csv", make_peer_csv(peers).encode())

@@ -29,6 +29,7 @@ class Row:
     tre_mm: float | None
     tre_ci95: tuple[float, float] | None  # over tests
     overlay_ci95: tuple[float, float] | None
+    tre_worst_mm: float | None  # of frames that the judge calls OK
     tre_refused_mm: float | None  # of poses that the judge refuses
     ok_share: float
     n_refused: int  # frames that are not OK
@@ -53,6 +54,7 @@ class Row:
             "overlay_error_mm": self.overlay_mm,
             "outline_error_mm": self.outline_mm,
             "tre_mm": self.tre_mm,
+            "tre_worst_mm": self.tre_worst_mm,
             "tre_refused_mm": self.tre_refused_mm,
             "ci95": {"tre_mm": self.tre_ci95, "overlay_error_mm": self.overlay_ci95},
             "ok_share": self.ok_share,
@@ -92,6 +94,7 @@ def make_row(
         tre_mm=_mean([one.tre_mm for one in _counted(frames, method)]),
         tre_ci95=_resample(tests, method, lambda frame: frame.tre_mm),
         overlay_ci95=_resample(tests, method, lambda frame: frame.displacement_mm),
+        tre_worst_mm=max((frame.tre_mm for frame in ok if frame.tre_mm is not None), default=None),
         tre_refused_mm=_mean([frame.tre_mm for frame in frames if not frame.is_ok]),
         ok_share=len(ok) / max(len(frames), 1),
         n_refused=len(frames) - len(ok),

@@ -1,6 +1,6 @@
 """The tables of an evaluation in the layout of the paper's tables 1 to 3, as Markdown."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from navapp.evaluation.paper.cases import SAMPLES, SITUATIONS, STAGE_NAMES, Case
 from navapp.evaluation.paper.published import CONTRADICTIONS, find_published
@@ -64,7 +64,7 @@ def make_tables(
         if shown:
             parts += [f"## Table {number}: {sample.title}", "", _HEAD, "|---" * 11 + "|"]
             parts += [_format_case(case, by_case) for case in shown] + [""]
-    parts += [*_format_judged(judged), *of_the_judge]
+    parts += [*_format_stages(rows), *_format_judged(judged), *of_the_judge]
     parts += ["## Where the paper contradicts itself", "", *(f"- {one}" for one in CONTRADICTIONS)]
     return "\n".join(parts) + "\n"
 
@@ -100,6 +100,48 @@ def _format_ours(row: Row | None) -> tuple[str, ...]:
         _fps(row.fps),
         seconds,
     )
+
+
+def _format_stages(rows: Sequence[Row]) -> list[str]:
+    """Ours by stage and situation, all samples together."""
+    lines = [
+        "## `bimcc` by stage and situation",
+        "",
+        "All samples together. Errors are those of OK frames: mean, and the worst one.",
+        "",
+        "| stage | situation | knees | frames | OK | TRE mm | worst mm | overlay mm "
+        "| within the bound |",
+        "|---|---|---|---|---|---|---|---|---|",
+    ]
+    for stage in STAGE_NAMES:
+        for situation, told in SITUATIONS.items():
+            found = [
+                row
+                for row in rows
+                if (row.method, row.case.stage, row.case.situation) == ("bimcc", stage, situation)
+            ]
+            if not found:
+                continue
+            n_frames = sum(row.n_frames for row in found)
+            n_ok = sum(row.n_ok for row in found)
+            worst_mm = max((row.tre_worst_mm or 0.0 for row in found), default=0.0)
+            within = _pool(found, lambda row: row.coverage)
+            lines.append(
+                f"| {_STAGES[stage]} | {told.title} | {sum(len(row.seeds) for row in found)} | "
+                f"{n_frames} | {_percent(n_ok / max(n_frames, 1))} | "
+                f"{format_mm(_pool(found, lambda row: row.tre_mm))} | "
+                f"{format_mm(worst_mm if n_ok else None)} | "
+                f"{format_mm(_pool(found, lambda row: row.overlay_mm))} | "
+                f"{'-' if within is None else _percent(within)} |"
+            )
+    return [*lines, ""]
+
+
+def _pool(rows: Sequence[Row], value_of: Callable[[Row], float | None]) -> float | None:
+    """Mean over all OK frames of several cases; None without any."""
+    known = [(row.n_ok, value) for row in rows if (value := value_of(row)) is not None]
+    n_ok = sum(n for n, _ in known)
+    return sum(n * value for n, value in known) / n_ok if n_ok else None
 
 
 def _format_judged(judged: Sequence[Judged]) -> list[str]:

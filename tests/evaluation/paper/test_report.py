@@ -46,7 +46,7 @@ def test_markdown_is_rendered(page) -> None:
                   "<strong>0.1</strong>", "<li>one &lt; two</li>"):  # fmt: skip
         assert words in page, words
     assert "|---" not in page
-    assert page.count("<svg") == 2
+    assert page.count("<svg") == 3
     assert render_markdown("a *b*") == "<p>a <em>b</em></p>\n"
 
 

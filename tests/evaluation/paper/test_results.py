@@ -58,6 +58,15 @@ def test_people_read_it_in_the_tables_and_in_the_report(written) -> None:
         assert words in report, words
 
 
+def test_charts_are_files_of_their_own(written) -> None:
+    stages, errors = ((written[0] / name).read_text() for name in ("stages.svg", "errors.svg"))
+    assert "TRE of OK frames" in stages
+    assert "overlay error" in errors
+    # Two situations of one stage were run: of four other stages and two situations there is none.
+    assert stages.count(">none<") == 2 * (5 * 4 - 2)
+    assert all(one.startswith("<svg") for one in (stages, errors))
+
+
 def test_every_frame_has_its_bounds_and_its_budget(written) -> None:
     with (written[0] / "frames.csv").open() as file:
         rows = [row for row in csv.DictReader(file) if row["method"] == "bimcc"]

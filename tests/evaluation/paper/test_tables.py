@@ -39,7 +39,7 @@ def test_all_cases_make_three_tables_of_twenty_rows_in_the_papers_order() -> Non
     tests = [one for case in ALL_CASES for one in done(followed(score(0.1)), case=case)]
     text = tables_of(tests)
     *tables, judge = tables_in(text)
-    assert [len(rows) for rows in tables] == [22, 22, 22]
+    assert [len(rows) for rows in tables] == [22, 22, 22, 22]
     for rows in [*tables, judge]:
         assert len({len(row) for row in rows}) == 1, "rows of unequal length"
     assert [row[0] for row in tables[0][2:] if row[0]] == [
@@ -49,7 +49,8 @@ def test_all_cases_make_three_tables_of_twenty_rows_in_the_papers_order() -> Non
     assert [line for line in text.splitlines() if line.startswith("#")] == [
         "# Evaluation on simulated knees", "## Table 1: man, 35 to 45",
         "## Table 2: woman, 35 to 45", "## Table 3: adult, 20 to 30",
-        "## The judge", "## Where the paper contradicts itself",
+        "## `bimcc` by stage and situation", "## The judge",
+        "## Where the paper contradicts itself",
     ]  # fmt: skip
 
 
@@ -63,6 +64,18 @@ def test_a_row_stands_beside_the_papers_figures() -> None:
         "opening the knee", "image registration: the leg lies still",
         "0.65, 7", "22, 25, 50 %", "0.52, 15", "22, 25, 50 %",
         "**0.400** (0.200 to 0.600)", "0.200 (0.100 to 0.300)", "50 %", "25", "0.6",
+    ]  # fmt: skip
+
+
+def test_a_stage_and_situation_pools_the_samples_by_their_ok_frames() -> None:
+    tests = [
+        *done(followed(score(0.1), score(0.2)), case=Case("man", "implant", "patient")),
+        *done(followed(score(0.6), score(9.0, "LOST")), case=Case("adult", "implant", "patient")),
+    ]
+    (row,) = tables_in(tables_of(tests))[2][2:]
+    assert row == [
+        "position of the implant", "the patient moves", "2", "4", "75 %", "0.300", "0.600",
+        "0.600", "67 %",
     ]  # fmt: skip
 
 
