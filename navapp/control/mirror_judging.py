@@ -59,7 +59,8 @@ class MirrorJudge:
         if estimate is None or stage.bone not in self._plan.bones:
             self._judged = self._error = None
             return None
-        variances = np.diag(estimate.covariance_at(np.zeros(3)))
+        growth_mm = 0.0 if estimate.sized is None else estimate.sized.growth_mm
+        variances = np.append(np.diag(estimate.covariance_at(np.zeros(3))), growth_mm**2)
         last = self._judged
         what = (stage.name, layers, made_steps)
         is_valid = last is not None and last[0] == what

@@ -107,14 +107,14 @@ class _HiddenBoneJudge(PoseJudge):
     ) -> tuple[Fit, RenderedView | None, Agreement | None]:
         """As of any judge, then grown."""
         fit, view, agreement = super()._settle(frame, fit, check)
-        covariance = fit.estimate.covariance
+        estimate = fit.estimate
         if view is not None and agreement is not None and agreement.lies_open:
             whole = self._whole.render(fit.pose, self._geometry, view.box)
             share = agreement.n_visible / max(int(np.count_nonzero(whole.mask)), 1)
             if agreement.coverage * share <= 1.0 - share * (1.0 - agreement.hidden_fraction):
                 # The noise of a bone in the open was counted: it is as claimed.
-                covariance = covariance / NOISE_VARIANCE_RATIO
-        estimate = replace(fit.estimate, covariance=covariance + self._spread)
+                estimate = estimate.scale_noise(1.0 / NOISE_VARIANCE_RATIO)
+        estimate = replace(estimate, covariance=estimate.covariance + self._spread)
         return replace(fit, estimate=estimate), view, agreement
 
 

@@ -62,16 +62,13 @@ class ResidualBlock:
         expected = self.variance + by_unknowns + self.common_sd**2
         is_near = (self.residual - rows @ step) ** 2 < _GATE_SIGMAS**2 * expected
         count = 1.0 / self.n_sharing
-        return NearResiduals(
-            is_near, expected[is_near], float(count.sum()), float(count[is_near].sum())
-        )
+        return NearResiduals(is_near, float(count.sum()), float(count[is_near].sum()))
 
 
 class NearResiduals(NamedTuple):
     """Those of a block's residuals that a pose allows."""
 
     is_near: NDArray[np.bool_]  # (N,)
-    expected_variance: FloatArray  # (M,) of those that are, with that of the pose
     # of residuals with errors of their own: all, and those that are near.
     n_all: float
     n_near: float
@@ -83,7 +80,7 @@ class NearResiduals(NamedTuple):
 
     @property
     def is_other(self) -> bool:
-        """Whether too many are not: most are of something else than the model at that pose."""
+        """Whether too many are far off: the block is of something else than the model there."""
         n_far = self.n_all - self.n_near
         return self.n_all >= _FEWEST and n_far > _MOST_FAR * self.n_all + _BY_CHANCE
 
@@ -125,16 +122,18 @@ def join(
     ratio2 = max((estimate.rms_mm / estimate.expected_rms_mm) ** 2, _LEAST_SQUARED_RATIO)
     scale = min(float(noise_under_kernel_mm2(ratio2, 1.0, kernel_sigmas)), 1.0)
     surface = _Surface(np.zeros(6), estimate.covariance, scale, noise_variance_ratio)
-    sized = None if estimate.sized is None else _join_size(estimate.sized, surface, block)
-    alone = replace(estimate.scale_noise(noise_variance_ratio), sized=sized)
     near = block.find_near(block.jacobian, surface.step, surface.covariance)
-    if near.is_other:
-        return alone.with_reason(Reason.CUES_DISAGREE)
-    if near.is_few:
-        return alone
-    step, covariance = _solve_joined(surface, block.jacobian, block, near)
-    if step @ np.linalg.solve(estimate.covariance, step) > _APART:
-        return alone
+    joined = None
+    if not (near.is_other or near.is_few):
+        joined = _solve_joined(surface, block.jacobian, block, near.is_near, surface.step)
+        if joined.step @ np.linalg.solve(estimate.covariance, joined.step) > _APART:
+            joined = None
+    step = surface.step if joined is None else joined.step
+    sized = None if estimate.sized is None else _join_size(estimate.sized, surface, block, step)
+    if joined is None:
+        alone = replace(estimate.scale_noise(noise_variance_ratio), sized=sized)
+        return alone.with_reason(Reason.CUES_DISAGREE) if near.is_other else alone
+    covariance = joined.covariance
     pose = estimate.camera_from_bone.move(step, centre_mm)
     sized, reasons = None if sized is None else sized.seen_from(step), estimate.reasons
     if Reason.DEGENERATE in reasons and not leaves_direction_free(covariance, centre_mm, seen_mm):
@@ -153,44 +152,69 @@ class _Surface(NamedTuple):
     noise_variance_ratio: float  # as of `join`
 
 
-def _join_size(sized: SizedPose, of_pose: _Surface, block: ResidualBlock) -> SizedPose:
-    """The pose in another size on which both agree; the surface's where the block says little."""
+class _Joined(NamedTuple):
+    """Where surface and block agree."""
+
+    step: FloatArray  # (k,)
+    covariance: FloatArray  # (k, k)
+    cost: float  # what is minimised: half of the squares of both, those of the block under a kernel
+
+
+def _join_size(
+    sized: SizedPose, of_pose: _Surface, block: ResidualBlock, pose_step: FloatArray
+) -> SizedPose:
+    """The pose in another size on which both agree; the surface's where the block says little.
+
+    A surface that is wrong about the size leaves most of a rim beyond the kernel, and a rim of
+    which a part lies elsewhere may agree with it in a wrong size. So it is looked for from the size
+    that the surface tells and from the model's own, at the pose (6,) that both gave it: the better
+    of the two minima counts.
+    """
     surface = of_pose._replace(step=sized.step, covariance=sized.covariance)
     rows = block.sized_jacobian(sized)
     near = block.find_near(rows, surface.step, surface.covariance)
     if near.is_few or near.is_other:
         return sized.scale_noise(surface.noise_variance_ratio)
-    step, covariance = _solve_joined(surface, rows, block, near)
-    return replace(sized, step=step, covariance=covariance)
+    starts = surface.step, np.append(pose_step, 0.0)
+    found = (_solve_joined(surface, rows, block, near.is_near, start) for start in starts)
+    best = min(found, key=lambda one: one.cost)
+    return replace(sized, step=best.step, covariance=best.covariance)
 
 
 def _solve_joined(
-    surface: _Surface, rows: FloatArray, block: ResidualBlock, near: NearResiduals
-) -> tuple[FloatArray, FloatArray]:
-    """(k,) unknowns on which surface and block agree, and their (k, k) covariance.
+    surface: _Surface,
+    rows: FloatArray,
+    block: ResidualBlock,
+    is_near: NDArray[np.bool_],
+    start: FloatArray,
+) -> _Joined:
+    """(k,) unknowns on which surface and block agree.
 
     Args:
         surface: says so much of the unknowns.
         rows: (N, k) how the block's predictions grow with the unknowns.
         block: joined.
-        near: those of its residuals that take part.
+        is_near: (N,) those of its residuals that take part.
+        start: (k,) of the search.
     """
-    residual, variance = block.residual[near.is_near], block.variance[near.is_near]
-    n_sharing, k = block.n_sharing[near.is_near], len(surface.step)
+    residual, variance = block.residual[is_near], block.variance[is_near]
+    n_sharing, k = block.n_sharing[is_near], len(surface.step)
     # The offset that the block's residuals have in common is one unknown more.
-    rows = np.column_stack([rows[near.is_near], np.ones(len(residual))])
+    rows = np.column_stack([rows[is_near], np.ones(len(residual))])
     known, offset = np.zeros((k + 1, k + 1)), np.zeros((k + 1, k + 1))
     known[:k, :k], offset[k, k] = np.linalg.inv(surface.covariance), 1.0 / block.common_sd**2
-    step: FloatArray = np.append(surface.step, 0.0)
-    by_surface = known @ step / surface.scale
-    # At first the unknowns may be off by as much as the surface leaves open: a kernel as narrow as
-    # the block's own noise would let none of its residuals speak.
-    kernel_variance = near.expected_variance
+    expected, step = np.append(surface.step, 0.0), np.append(start, 0.0)
+    by_surface = known @ expected / surface.scale
+
+    def weigh(step: FloatArray) -> tuple[FloatArray, FloatArray]:
+        misfit2 = (residual - rows @ step) ** 2 / variance
+        return misfit2, np.exp(-0.5 * misfit2 / _KERNEL_SIGMAS**2)
+
     for _ in range(_ROUNDS):
-        misfit = residual - rows @ step
-        count = np.exp(-0.5 * misfit**2 / (_KERNEL_SIGMAS**2 * kernel_variance)) / n_sharing
-        n, squares = float(count.sum()), float((count * misfit**2 / kernel_variance).sum())
+        misfit2, kernel = weigh(step)
+        count = kernel / n_sharing
         # What the residuals show of their claimed variance, drawn to 1 when they are few.
+        n, squares = float(count.sum()), float((count * misfit2).sum())
         shown = float(noise_under_kernel_mm2(squares, n, _KERNEL_SIGMAS))
         scale = (_CLAIM_COUNT + n * shown) / (_CLAIM_COUNT + n)
         weighted = rows.T * (count / variance)
@@ -198,10 +222,12 @@ def _solve_joined(
         normal = known / surface.scale + offset + information / scale
         both = by_surface + weighted @ residual / scale
         step = np.asarray(np.linalg.solve(normal, both), dtype=np.float64)
-        kernel_variance = variance
     inverse = np.linalg.inv(normal)
     # A block that shows more noise than it claims is believed.
     noise = surface.noise_variance_ratio * known / surface.scale**2 + offset
     noise += information * max(scale, 1.0) / scale**2
     covariance = (inverse @ noise @ inverse)[:k, :k]
-    return step[:k], 0.5 * (covariance + covariance.T)
+    lost = _KERNEL_SIGMAS**2 * (1.0 - weigh(step)[1]) / n_sharing
+    apart = step - expected
+    cost = 0.5 * float(apart @ (known / surface.scale + offset) @ apart) + float(lost.sum())
+    return _Joined(step[:k], 0.5 * (covariance + covariance.T), cost)

@@ -155,8 +155,7 @@ class BimccTracker(Tracker):
         """What the same pictures say without what is mirrored in the bone, if OK and better.
 
         Else the answer as it is: of two that are refused the first has seen more. One that surely
-        saw another size stays: highlights do not make a bone look larger, and what is left without
-        them shows less of its size.
+        saw another size stays: without highlights less of the surface is left to tell it.
 
         Args:
             frame: of the answer.

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from navapp.geometry.rectification import Image
 from navapp.geometry.transform import RigidTransform
 from navapp.registration import distinct, make_far_starts, make_near_starts, select_poses
+from navapp.registration.multi_start import is_same_pose
 from navapp.registration.verdict import Goal
 from navapp.tracking.frame import Fit, Frame
 from navapp.tracking.picked_landmarks import find_rough_poses
@@ -99,8 +100,10 @@ class FirstRegistration:
             answers = self._look_again(frame, self._judge_distinct(frame, fits, goal), goal)
         if not _is_ok(answers):
             buried = self._judge_buried(frame, measured, goal)
+            is_doubted = self._is_doubted(buried, answers)
             answers = sorted([buried, *answers], key=lambda one: one.verdict.rank)
-            answers = self._look_again(frame, answers, goal)
+            if answers[0] is buried and not is_doubted:
+                answers = self._look_again(frame, answers, goal)
         frame.on_progress(1.0)
         return answers
 
@@ -118,6 +121,16 @@ class FirstRegistration:
         # The bone is expected where it was found: the start may be far off.
         found = self._tracker.rectify_pose(pose)
         return [self._tracker.look_again(frame, best, goal, found), *others]
+
+    def _is_doubted(self, found: TrackedFrame, others: list[TrackedFrame]) -> bool:
+        """Whether an answer at the same place has what no second look takes back."""
+        pose, against = found.left_from_bone, {Reason.AMBIGUOUS, Reason.SIZE_DIFFERS}
+        return pose is not None and any(
+            one.left_from_bone is not None
+            and is_same_pose(pose, one.left_from_bone, self._tracker.centre_mm)
+            and not against.isdisjoint(one.verdict.reasons)
+            for one in others
+        )
 
     def _judge_buried(self, frame: Frame, measured: Measurement, goal: Goal) -> TrackedFrame:
         """The answer of the search for a bone that tissue continues."""

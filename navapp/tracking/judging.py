@@ -38,7 +38,8 @@ from navapp.values import (
 )
 
 # All chosen. Errors of a cartilage's thickness are correlated over much of a bone. Points do not
-# average them out: the pose may be off by so many of their standard deviations (docs/accuracy.md).
+# average them out: the pose may be off by so many of their standard deviations
+# (docs/measurements.md).
 _COMMON_ERROR_SIGMAS = 2.0
 _SURE_SIGMAS = 3.0
 # A model that the outline moved by no more looks as it was matched; a follower allows as much.

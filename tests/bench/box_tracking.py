@@ -1,4 +1,4 @@
-"""The bone's box without a pose, and how soon both are found again (docs/accuracy.md).
+"""The bone's box without a pose, and how soon both are found again (docs/measurements.md).
 
 usage: python -m tests.bench.box_tracking [--first N] [--seeds N] [--frames N] [--only WORD]
            [--poses]

@@ -1,4 +1,4 @@
-"""Simulated tibias, half buried in tissue, registered from a rough pose (docs/accuracy.md).
+"""Simulated tibias, half buried in tissue, registered from a rough pose (docs/measurements.md).
 
 usage: python -m tests.bench.buried_bone [--seeds N] [--first SEED]
 

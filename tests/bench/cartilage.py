@@ -1,4 +1,4 @@
-"""Cartilage that the camera sees and the CT does not, printed as the tables of docs/accuracy.md.
+"""Cartilage that the camera sees and the CT does not: the tables of docs/measurements.md.
 
 usage: python -m tests.bench.cartilage [--seeds N] [--frames N] [--each]
 

@@ -1,4 +1,4 @@
-"""What fits on the model leave beyond noise, printed as the table of docs/accuracy.md.
+"""What fits on the model leave beyond noise, printed as the table of docs/measurements.md.
 
 usage: python -m tests.bench.correlated_residuals [--seeds N] [--first SEED]
 

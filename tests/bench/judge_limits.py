@@ -4,9 +4,10 @@ usage: python -m tests.bench.judge_limits [--knees N] [--frames N] [--stage STAG
 
 Simulated knees of two groups: on the training knees a limit is set, on the others it is reported.
 Poses come from the right plan, begun at the true pose and beside it, and from plans of another
-person, of the other side and of another size. A pose is right when its targets lie within 1 mm of
-where they are in the bone. "Set" is the limit that one of 200 right poses of the training knees is
-beyond. The shares are of poses beyond the limit that `registration/verdict.py` has.
+person, of the other side and of another size. A pose of the right plan is right when its targets
+lie within 1 mm of where they are in the bone; any pose is wrong when they lie further off. What is
+asked and gives no pose is counted beside. "Set" is the limit that one of 200 right poses of the
+training knees is beyond. Shares are of poses beyond the limit that `registration/verdict.py` has.
 """
 
 import argparse
@@ -24,6 +25,7 @@ from navapp.evaluation.sequence import KnownSequence
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.registration.verdict import RULES, Evidence, Goal, Rule, decide
+from navapp.resection.cut_bone import CutBone
 from navapp.tracking import TrackState, judging
 from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.values import BoneModel, Reason, Status, Verdict
@@ -68,11 +70,17 @@ class Judged:
     status: Status
     error_mm: float
     bound_mm: float
+    is_right_plan: bool
 
     @property
     def is_right(self) -> bool:
-        """Whether the targets lie where they are in the bone."""
-        return self.error_mm <= _RIGHT_MM
+        """Whether the targets of the right plan lie where they are in the bone."""
+        return self.is_right_plan and self.error_mm <= _RIGHT_MM
+
+    @property
+    def is_wrong(self) -> bool:
+        """Whether targets lie elsewhere."""
+        return self.error_mm > _RIGHT_MM
 
 
 def main() -> None:
@@ -82,6 +90,8 @@ def main() -> None:
     parser.add_argument("--frames", type=int, default=3)
     parser.add_argument("--stage", nargs="+", default=[stage.name for stage in STAGES])
     options = parser.parse_args()
+    if options.knees < 2:
+        parser.error("another person's plan needs 2 knees")
     groups = [
         [
             one
@@ -93,7 +103,7 @@ def main() -> None:
     _tell(*groups)
 
 
-def _judge_stage(stage: str, first: int, options: argparse.Namespace) -> Iterator[Judged]:
+def _judge_stage(stage: str, first: int, options: argparse.Namespace) -> Iterator[Judged | None]:
     for situation in _SITUATIONS:
         sequences = [
             render_knee(stage, situation, number, first, options.frames * _STRIDE, 1.0)
@@ -105,15 +115,24 @@ def _judge_stage(stage: str, first: int, options: argparse.Namespace) -> Iterato
         print(f"{stage}, {situation}, from seed {first}", file=sys.stderr, flush=True)
 
 
-def _judge_knee(sequence: KnownSequence, other: KnownSequence, seed: int) -> Iterator[Judged]:
+def _judge_knee(
+    sequence: KnownSequence, other: KnownSequence, seed: int
+) -> Iterator[Judged | None]:
     random = np.random.default_rng(seed)
-    own = sequence.plan.bones[sequence.stage.bone]
+    own = _as_made(sequence)
     targets_mm = sequence.plan.targets_of(sequence.stage.targets)
     for shift_mm, turn_deg in _STARTS:
         offsets = random.uniform(-1.0, 1.0, 6) * np.repeat([shift_mm, math.radians(turn_deg)], 3)
-        yield from _follow(sequence, own, targets_mm, offsets)
-    for bone, moved_mm in _wrong_bones(own, targets_mm, other.plan.bones[other.stage.bone]):
-        yield from _follow(sequence, bone, moved_mm, np.zeros(6))
+        yield from _follow(sequence, own, targets_mm, offsets, is_right_plan=True)
+    for bone, moved_mm in _wrong_bones(own, targets_mm, _as_made(other)):
+        yield from _follow(sequence, bone, moved_mm, np.zeros(6), is_right_plan=False)
+
+
+def _as_made(sequence: KnownSequence) -> BoneModel:
+    """The stage's bone with the cuts and holes that are made before it."""
+    name, steps = sequence.stage.bone, sequence.plan.content.steps
+    made = {one: steps[one] for one in sequence.made_steps if steps[one].bone == name}
+    return CutBone(sequence.plan.bones[name], made).model
 
 
 def _wrong_bones(
@@ -140,8 +159,10 @@ def _follow(
     bone: BoneModel,
     moved_mm: FloatArray,
     offsets: FloatArray,
-) -> Iterator[Judged]:
-    """Frames of a sequence, each followed from beside the true pose without any search."""
+    *,
+    is_right_plan: bool,
+) -> Iterator[Judged | None]:
+    """Frames of a sequence, each followed from beside the true pose; None where no pose is told."""
     tracker = BimccTracker(sequence.rig, bone)
     goal = Goal(moved_mm, sequence.stage.tolerance_mm)
     targets_mm = sequence.plan.targets_of(sequence.stage.targets)
@@ -152,11 +173,12 @@ def _follow(
         start = true.move(offsets, true.apply(tracker.centre_mm))
         judged = _judge_frame(tracker, frame, start, goal)
         if judged is None:
+            yield None
             continue
         pose, evidence, verdict = judged
         error_mm = np.linalg.norm(pose.apply(moved_mm) - true.apply(targets_mm), axis=1).mean()
         bound_mm = math.inf if evidence.bound_mm is None else evidence.bound_mm
-        yield Judged(evidence, verdict.status, float(error_mm), bound_mm)
+        yield Judged(evidence, verdict.status, float(error_mm), bound_mm, is_right_plan)
 
 
 def _judge_frame(
@@ -175,33 +197,38 @@ def _judge_frame(
     return pose, evidence, tracked.verdict
 
 
-def _tell(training: Sequence[Judged], others: Sequence[Judged]) -> None:
+def _tell(training: Sequence[Judged | None], others: Sequence[Judged | None]) -> None:
     print("| rule | looked at | limit | set | right beyond: training, others | wrong beyond |")
     print("|---|---|---|---|---|---|")
-    right, wrong = (
-        [[one for one in group if one.is_right is is_right] for group in (training, others)]
-        for is_right in (True, False)
-    )
+    groups = [[one for one in group if one is not None] for group in (training, others)]
+    right = [[one for one in group if one.is_right] for group in groups]
+    wrong = [[one for one in group if one.is_wrong] for group in groups]
     for rule in RULES:
         values = _values(rule, right[0])
         if rule.reason not in _TELLING or rule.degraded is None or len(values) == 0:
             continue
         level = _BEYOND_SHARE if rule.is_below else 1.0 - _BEYOND_SHARE
         told = (
-            ", ".join(f"{100.0 * _share_beyond(rule, one):.1f} %" for one in groups)
-            for groups in (right, wrong)
+            ", ".join(f"{100.0 * _share_beyond(rule, one):.1f} %" for one in poses)
+            for poses in (right, wrong)
         )
         print(
             f"| {rule.reason.name} | {rule.quantity} | {rule.degraded:g} | "
             f"{np.quantile(values, level):.2f} | {' | '.join(told)} |"
         )
-    print("\n| knees | right poses | OK | wrong poses | OK | of these beyond the bound |")
-    print("|---|---|---|---|---|---|")
-    for name, good, bad in zip(("training", "others"), right, wrong, strict=True):
+    print("\n| knees | asked | no pose | right | OK | wrong | OK | of these beyond the bound |")
+    print("|---|---|---|---|---|---|---|---|")
+    asked = [(len(group), sum(one is None for one in group)) for group in (training, others)]
+    for name, (n_asked, n_silent), good, bad in zip(
+        ("training", "others"), asked, right, wrong, strict=True
+    ):
         n_ok = sum(one.status is Status.OK for one in good)
         ok = [one for one in bad if one.status is Status.OK]
         beyond = sum(one.error_mm > one.bound_mm for one in ok)
-        print(f"| {name} | {len(good)} | {n_ok} | {len(bad)} | {len(ok)} | {beyond} |")
+        print(
+            f"| {name} | {n_asked} | {n_silent} | {len(good)} | {n_ok} | {len(bad)} | {len(ok)} | "
+            f"{beyond} |"
+        )
 
 
 def _values(rule: Rule, judged: Sequence[Judged]) -> FloatArray:

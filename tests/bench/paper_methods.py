@@ -1,4 +1,4 @@
-"""The paper's two chains beside ours on recorded operations: the table of docs/accuracy.md.
+"""The paper's two chains beside ours on recorded operations: the table of docs/measurements.md.
 
 usage: python -m tests.bench.paper_methods [FOLDER] [--bone femur|tibia] [--only NAME]
 

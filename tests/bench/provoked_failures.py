@@ -1,4 +1,4 @@
-"""Operations in which something goes wrong on purpose, printed as the tables of docs/accuracy.md.
+"""Operations in which something goes wrong on purpose: the tables of docs/measurements.md.
 
 usage: python -m tests.bench.provoked_failures [--seeds N] [--rate HZ] [--only NAME] [--each]
 

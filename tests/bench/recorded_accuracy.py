@@ -1,4 +1,4 @@
-"""Accuracy on recorded operations with truth, printed as the tables of docs/accuracy.md.
+"""Accuracy on recorded operations with truth, printed as the tables of docs/measurements.md.
 
 usage: python -m tests.bench.recorded_accuracy [FOLDER] [--bone femur|tibia] [--only NAME]
                                                [--order ORDER ...] [--frames]

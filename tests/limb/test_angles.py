@@ -1,11 +1,13 @@
 """Angles of Grood and Suntay: signs by words on both sides, and bounds that hold."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from navapp.limb.angles import measure_angles
 from navapp.limb.axes import find_limb_axes, find_missing
-from navapp.values import ANKLE_CENTRE, HIP_CENTRE
+from navapp.values import ANKLE_CENTRE, HIP_CENTRE, SizedPose
 from tests.limb.knees import camera_from_femur, estimate, femur_from_tibia, landmarks
 
 
@@ -51,6 +53,20 @@ def test_bounds_count_both_covariances() -> None:
     both = measure(femur_from_tibia(60.0), "right", covariance, covariance)
     assert one.flexion_bound_deg == pytest.approx(1.96 * 0.1)
     assert both.varus_bound_deg == pytest.approx(1.96 * 0.1 * 2**0.5)
+
+
+def test_bounds_count_the_turn_by_a_seen_size() -> None:
+    relative = femur_from_tibia(60.0)
+    step = np.array([0.0, 0.0, 0.0, 0.002, 0.001, -0.003, 0.5])
+    sized = SizedPose(step, np.eye(7), np.zeros(3), lever_mm=20.0)
+    femur, tibia = estimate(camera_from_femur()), estimate(camera_from_femur() @ relative)
+    axes = find_limb_axes(landmarks("right"))
+    grown = measure_angles(axes, replace(femur, sized=sized), tibia, "right")
+    turned = measure(relative, "right", np.outer(step[:6], step[:6]))
+    for name in ("flexion", "varus", "internal_rotation"):
+        bound_deg = getattr(grown, f"{name}_bound_deg")
+        assert bound_deg == pytest.approx(getattr(turned, f"{name}_bound_deg"))
+        assert bound_deg > 0.01
 
 
 def test_bounds_hold_for_drawn_poses() -> None:

@@ -1,5 +1,7 @@
 """A tool in a bone's coordinates, beside numbers worked out by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import ArrayLike
@@ -7,7 +9,7 @@ from scipy.stats import chi2, rayleigh
 
 from navapp.geometry.transform import FloatArray, RigidTransform, rotation_from_vector
 from navapp.tools.tool_on_bone import ToolOnBone, place_on_bone
-from navapp.values import DrillAxis, PoseEstimate
+from navapp.values import DrillAxis, PoseEstimate, SizedPose
 from tests.tools.seen_tools import seen_at, tool_of
 
 # The bone's x is the camera's y, its y the camera's -x.
@@ -69,6 +71,24 @@ def test_without_an_axis_no_angle_is_told() -> None:
     offset = placed((-14.0, -7.0, 17.0)).hole_offset("peg", HOLE)
     assert (offset.angle_deg, offset.bound_deg) == (None, None)
     assert offset.off_mm == pytest.approx(5.0)
+
+
+def test_a_seen_size_shifts_the_tip_and_turns_the_axis() -> None:
+    """5 % at a tip that lies (13, 15, -43) mm from the model's middle, about which it grows."""
+    step = np.array([0.0, 0.0, 0.0, 0.01, 0.0, 0.0, 1.0])
+    sized = SizedPose(step, np.eye(7), np.zeros(3), lever_mm=20.0)
+    tool = tool_of(tip_mm=(3.0, -5.0, 17.0), tip_sigma_mm=1e-6, axis=(0.0, 0.0, 1.0))
+    found = place_on_bone(
+        seen_at(tool, PLATE, TINY),
+        "femur",
+        replace(estimate_of(TINY), sized=sized),
+        np.array([0.0, 0.0, 50.0]),
+    )
+    shift_mm = 0.05 * np.array([13.0, 15.0, -43.0]) + np.cross(
+        [0.01, 0.0, 0.0], (13.0, 15.0, -43.0)
+    )
+    assert np.trace(found.covariance_mm2) == pytest.approx(shift_mm @ shift_mm, rel=1e-6)
+    assert found.axis_bound_deg == pytest.approx(np.degrees(0.01) * rayleigh.ppf(0.95), rel=1e-2)
 
 
 def test_the_bound_grows_with_what_is_not_known_of_the_bone() -> None:

@@ -63,26 +63,42 @@ def test_what_surely_saw_another_size_is_not_overturned_by_a_second_look() -> No
     assert best.verdict.reasons == (Reason.SIZE_DIFFERS,)
 
 
+@pytest.mark.parametrize(
+    ("said_before", "is_found"),
+    [(Reason.COVERAGE_LOW, True), (Reason.AMBIGUOUS, False), (Reason.SIZE_DIFFERS, False)],
+)
 def test_what_the_search_for_a_buried_bone_finds_is_looked_at_again(
-    monkeypatch: pytest.MonkeyPatch,
+    said_before: Reason, is_found: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The right pose of a glossy bone may be found by it alone."""
+    """The right pose of a glossy bone may be found by it alone, unless it was doubted before."""
     a = room()
     picture = a.frames[0]
     tracker = BimccTracker(a.rig, a.tracker.model.bone)
     tracker.highlights = Found(tracker)
     registration = FirstRegistration(tracker)
     frame = tracker.begin(picture.left, picture.right, a.truth(picture), Stopwatch())
-    fit = next(iter(tracker.near.find_on_model(frame)))
-    right = tracker.judge.judge(frame, fit, GOAL)
-    verdict = replace(right.verdict, status=Status.DEGRADED, reasons=(Reason.SURFACE_MISFIT,))
-    doubted = replace(right, verdict=verdict)
-    nothing = tracker.judge.lost(Reason.NO_SURFACE, frame.watch)
-    monkeypatch.setattr(registration, "_judge_distinct", lambda *_: [nothing])
-    monkeypatch.setattr(registration, "_judge_buried", lambda *_: doubted)
+    right = tracker.judge.judge(frame, next(iter(tracker.near.find_on_model(frame))), GOAL)
+
+    def doubted(reason: Reason, coverage: float) -> TrackedFrame:
+        verdict = replace(right.verdict, status=Status.DEGRADED, coverage=coverage)
+        return replace(right, verdict=replace(verdict, reasons=(reason,)))
+
+    first, buried = doubted(said_before, 0.1), doubted(Reason.SURFACE_MISFIT, 0.5)
+    monkeypatch.setattr(registration, "_judge_distinct", lambda *_: [first])
+    monkeypatch.setattr(registration, "_look_again", only_once(registration._look_again))
+    monkeypatch.setattr(registration, "_judge_buried", lambda *_: buried)
     best, *_ = registration._register_around(frame, GOAL)
-    assert best.is_matte
-    assert best.verdict.status is Status.OK
+    assert (best.verdict.status is Status.OK) is is_found
+
+
+def only_once(look_again):
+    """Looks again at answers that the search for a buried bone gave, and at no earlier ones."""
+
+    def look(frame, answers, goal):
+        is_last = Reason.SURFACE_MISFIT in answers[0].verdict.reasons
+        return look_again(frame, answers, goal) if is_last else answers
+
+    return look
 
 
 @pytest.mark.parametrize("is_glossy", [False, True])

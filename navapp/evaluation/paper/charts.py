@@ -34,6 +34,7 @@ def draw_stages(rows: Sequence[Row]) -> str:
 
     Bars are means over the samples, lines reach from the best to the worst sample.
     """
+    from matplotlib.patches import Patch
 
     def draw(figure: Any) -> None:
         errors, shares = figure.subplots(1, 2)
@@ -41,9 +42,11 @@ def draw_stages(rows: Sequence[Row]) -> str:
         errors.set(ylabel="TRE of OK frames, mm, mean")
         _draw_by_stage(shares, rows, lambda row: 100.0 * row.ok_share)
         shares.set(ylabel="OK, % of frames", ylim=(0.0, 100.0))
-        figure.legend(
-            *errors.get_legend_handles_labels(), frameon=False, ncols=4, loc="outside upper center"
-        )
+        names = [
+            Patch(color=colour, label=_SHORT[one])
+            for one, colour in zip(SITUATIONS, _SITUATION_COLOURS, strict=True)
+        ]
+        figure.legend(handles=names, frameon=False, ncols=4, loc="outside upper center")
 
     return draw_svg(draw, (9.6, 3.2))
 
@@ -61,8 +64,7 @@ def _draw_by_stage(axes: Any, rows: Sequence[Row], value_of: Callable[[Row], flo
             if not values:
                 axes.text(at, 0.0, "none", ha="center", va="bottom", fontsize=6, rotation=90)
                 continue
-            label = _SHORT[situation] if place == 0 else None
-            axes.bar(at, np.mean(values), 0.18, color=colour, label=label)
+            axes.bar(at, np.mean(values), 0.18, color=colour)
             axes.plot((at, at), (min(values), max(values)), color="black", linewidth=0.8)
     axes.set_xticks(np.arange(len(STAGE_NAMES)), STAGE_NAMES)
 

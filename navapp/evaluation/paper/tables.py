@@ -124,7 +124,7 @@ def _format_stages(rows: Sequence[Row]) -> list[str]:
                 continue
             n_frames = sum(row.n_frames for row in found)
             n_ok = sum(row.n_ok for row in found)
-            worst_mm = max((row.tre_worst_mm or 0.0 for row in found), default=0.0)
+            worst_mm = max(row.tre_worst_mm or 0.0 for row in found)
             within = _pool(found, lambda row: row.coverage)
             lines.append(
                 f"| {_STAGES[stage]} | {told.title} | {sum(len(row.seeds) for row in found)} | "

@@ -21,7 +21,7 @@ _STAMPS = "the time stamps of both pictures"
 _MM_S_PER_BLUR_PX = 450.0 / (1403.0 * 0.008)
 # A leg that is moved while the eyes see it at two times, or the rows at many.
 _SLOW_DRIFT_MM_S, _DRIFT_RATE_HZ = 50.0, 30.0
-# As of a thickness that is known vertex by vertex (docs/accuracy.md).
+# As of a thickness that is known vertex by vertex (docs/measurements.md).
 _CARTILAGE_MM, _CARTILAGE_SD_MM = 2.0, 0.4
 
 

@@ -60,7 +60,8 @@ def test_people_read_it_in_the_tables_and_in_the_report(written) -> None:
 
 def test_charts_are_files_of_their_own(written) -> None:
     stages, errors = ((written[0] / name).read_text() for name in ("stages.svg", "errors.svg"))
-    assert "TRE of OK frames" in stages
+    for words in ("TRE of OK frames", "registration", "patient moves", "instrument moves"):
+        assert words in stages, words
     assert "overlay error" in errors
     # Two situations of one stage were run: of four other stages and two situations there is none.
     assert stages.count(">none<") == 2 * (5 * 4 - 2)
