@@ -165,10 +165,9 @@ def _join_size(
 ) -> SizedPose:
     """The pose in another size on which both agree; the surface's where the block says little.
 
-    A surface that is wrong about the size leaves most of a rim beyond the kernel, and a rim of
-    which a part lies elsewhere may agree with it in a wrong size. So it is looked for from the size
-    that the surface tells and from the model's own, at the pose (6,) that both gave it: the better
-    of the two minima counts.
+    A surface that is wrong about the size leaves most of a rim beyond the kernel. So it is looked
+    for from the size that the surface tells, and from the model's own at the pose (6,) that both
+    gave it: the better of the two minima counts.
     """
     surface = of_pose._replace(step=sized.step, covariance=sized.covariance)
     rows = block.sized_jacobian(sized)

@@ -99,4 +99,6 @@ class Fit:
         excess = max(0.0, self.variance_ratio - NOISE_VARIANCE_RATIO)
         lengths = FREE_CORRELATION_PX / MODEL_CORRELATION_PX
         growth = 1.0 + excess / noise_variance_ratio * lengths**2
-        return replace(self, estimate=self.estimate.scale_noise(growth))
+        # The size's stays: what does not fit for another size is not to hide it.
+        covariance = growth * self.estimate.covariance
+        return replace(self, estimate=replace(self.estimate, covariance=covariance))
