@@ -87,17 +87,25 @@ def compute_information(
     if eigenvalues[0] <= _SINGULAR_FRACTION * eigenvalues[-1]:
         return Information(np.diag([np.inf] * 6), free)
     seen = _Seen(seen_mm, lever_mm, pose.rotation, pose.rotation @ (centre_mm - seen_mm))
-    H, _ = sum_plane_system(pairs, n, centre_mm, lever_mm)
-    change = np.diag([1.0] * 3 + [1.0 / lever_mm] * 3) @ turned
-    inverse = np.linalg.inv(H)
-    covariance = n_sharing_errors * change @ inverse @ change.T
-    covariance = 0.5 * (covariance + covariance.T)
+    change = seen.pose_by_points[:6, :6]
     if n_sharing_relief <= 0.0:
-        return Information(covariance, free)
-    squared, _ = sum_plane_system(pairs._replace(weight=pairs.weight**2), n, centre_mm, lever_mm)
-    relief = n_sharing_relief * RELIEF_SD_MM**2 * change @ inverse @ squared @ inverse @ change.T
-    sized = _find_sized(pairs, n, seen, n_sharing_errors, n_sharing_relief)
-    return Information(covariance, free, 0.5 * (relief + relief.T), sized)
+        return Information(n_sharing_errors * _propagate(change, np.linalg.inv(H)), free)
+    relief = n_sharing_relief * RELIEF_SD_MM**2
+    sized, g = _sum_sized_system(pairs, n, seen)
+    squared, _ = _sum_sized_system(pairs._replace(weight=pairs.weight**2), n, seen)
+    inverse = np.linalg.inv(H)
+    return Information(
+        n_sharing_errors * _propagate(change, inverse),
+        free,
+        relief * _propagate(change @ inverse, squared[:6, :6]),
+        _find_sized(sized, g, squared, seen, n_sharing_errors, relief),
+    )
+
+
+def _propagate(change: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Covariance (k, k) of `change` @ x, where x has that covariance; symmetric."""
+    propagated: FloatArray = change @ covariance @ change.T
+    return 0.5 * (propagated + propagated.T)
 
 
 class _Seen(NamedTuple):
@@ -123,17 +131,29 @@ class _Seen(NamedTuple):
 
 
 def _find_sized(
-    pairs: Pairs, n: int, seen: _Seen, n_sharing_errors: float, n_sharing_relief: float
+    H: FloatArray, g: FloatArray, squared: FloatArray, seen: _Seen, n_sharing: float, relief: float
 ) -> SizedPose:
-    """The pose with the size as a seventh unknown; where the pairs do not fix it, as expected."""
-    H, g = _sum_sized_system(pairs, n, seen)
-    H[6, 6] += n_sharing_errors / (_SIZE_SD * seen.lever_mm) ** 2
-    inverse, change = np.linalg.inv(H), seen.pose_by_points
-    covariance = n_sharing_errors * change @ inverse @ change.T
-    squared, _ = _sum_sized_system(pairs._replace(weight=pairs.weight**2), n, seen)
-    relief = n_sharing_relief * RELIEF_SD_MM**2 * change @ inverse @ squared @ inverse @ change.T
-    covariance, relief = (0.5 * (one + one.T) for one in (covariance, relief))
-    return SizedPose(change @ (inverse @ -g), covariance, seen.arm_mm, seen.lever_mm, relief)
+    """The pose with the size as a seventh unknown; where the pairs do not fix it, as expected.
+
+    Args:
+        H: (7, 7) normal equations.
+        g: (7,) of them.
+        squared: (7, 7) as `H`, with squared weights.
+        seen: surface.
+        n_sharing: so many pairs have their errors in common.
+        relief: variance of the bone's relief, times the pairs that share it.
+    """
+    H = H.copy()
+    H[6, 6] += n_sharing / (_SIZE_SD * seen.lever_mm) ** 2
+    inverse: FloatArray = np.asarray(np.linalg.inv(H), dtype=np.float64)
+    change = seen.pose_by_points
+    return SizedPose(
+        change @ (inverse @ -g),
+        n_sharing * _propagate(change, inverse),
+        seen.arm_mm,
+        seen.lever_mm,
+        relief * _propagate(change @ inverse, squared),
+    )
 
 
 def _sum_sized_system(pairs: Pairs, n: int, seen: _Seen) -> tuple[FloatArray, FloatArray]:

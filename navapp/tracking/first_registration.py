@@ -7,8 +7,13 @@ from typing import TYPE_CHECKING
 
 from navapp.geometry.rectification import Image
 from navapp.geometry.transform import RigidTransform
-from navapp.registration import distinct, make_far_starts, make_near_starts, select_poses
-from navapp.registration.multi_start import is_same_pose
+from navapp.registration import (
+    distinct,
+    is_same_pose,
+    make_far_starts,
+    make_near_starts,
+    select_poses,
+)
 from navapp.registration.verdict import Goal
 from navapp.tracking.frame import Fit, Frame
 from navapp.tracking.picked_landmarks import find_rough_poses

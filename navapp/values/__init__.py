@@ -30,6 +30,7 @@ from navapp.values.contents import (
     SurgicalContent,
     kind_of,
 )
+from navapp.values.estimates import PoseEstimate, SizedPose
 from navapp.values.faces import MeasuredFace, join_faces
 from navapp.values.holes import Measured, MeasuredHole, join_measured
 from navapp.values.measured import (
@@ -42,15 +43,9 @@ from navapp.values.measured import (
 )
 from navapp.values.pictures import DEPTH_COLOURS, OverlayMode, OverlayPicture
 from navapp.values.plans import FEWEST_PICKS, Pick, Plan, Prior, StageSpec, find_crowded
+from navapp.values.reasons import Reason
 from navapp.values.timings import FrameTimings, Stopwatch
-from navapp.values.verdicts import (
-    PoseEstimate,
-    Reason,
-    SizedPose,
-    Status,
-    TrackedFrame,
-    Verdict,
-)
+from navapp.values.verdicts import Status, TrackedFrame, Verdict
 
 __all__ = [
     "ANKLE_CENTRE",

@@ -25,11 +25,11 @@ from navapp.evaluation.sequence import KnownSequence
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.registration.verdict import RULES, Evidence, Goal, Rule, decide
-from navapp.resection.cut_bone import CutBone
 from navapp.tracking import TrackState, judging
 from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.values import BoneModel, Reason, Status, Verdict
 from tests.bench.bounds import FIRST_SEED, render_knee
+from tests.bench.wrong_sizes import find_bone_as_made, stretch_bone
 
 _OTHER_SEED = FIRST_SEED + 500
 # Rules that tell a right place from a wrong one; the others hold promises (errors in mm), or ask
@@ -46,7 +46,7 @@ _STRIDE = 12
 
 
 @dataclass(slots=True)
-class Log:
+class DecisionLog:
     """Stands for `decide`, and keeps what it was asked."""
 
     asked: list[tuple[Verdict, Evidence]] = field(default_factory=list)
@@ -119,39 +119,25 @@ def _judge_knee(
     sequence: KnownSequence, other: KnownSequence, seed: int
 ) -> Iterator[Judged | None]:
     random = np.random.default_rng(seed)
-    own = _as_made(sequence)
+    own = find_bone_as_made(sequence)
     targets_mm = sequence.plan.targets_of(sequence.stage.targets)
     for shift_mm, turn_deg in _STARTS:
         offsets = random.uniform(-1.0, 1.0, 6) * np.repeat([shift_mm, math.radians(turn_deg)], 3)
         yield from _follow(sequence, own, targets_mm, offsets, is_right_plan=True)
-    for bone, moved_mm in _wrong_bones(own, targets_mm, _as_made(other)):
+    for bone, moved_mm in _wrong_bones(own, targets_mm, find_bone_as_made(other)):
         yield from _follow(sequence, bone, moved_mm, np.zeros(6), is_right_plan=False)
-
-
-def _as_made(sequence: KnownSequence) -> BoneModel:
-    """The stage's bone with the cuts and holes that are made before it."""
-    name, steps = sequence.stage.bone, sequence.plan.content.steps
-    made = {one: steps[one] for one in sequence.made_steps if steps[one].bone == name}
-    return CutBone(sequence.plan.bones[name], made).model
 
 
 def _wrong_bones(
     own: BoneModel, targets_mm: FloatArray, other: BoneModel
 ) -> Iterator[tuple[BoneModel, FloatArray]]:
     """Wrong plans of a bone, with its targets in them."""
-    centre_mm, mesh = own.mesh.centroid_mm, own.mesh
-    to_own_mm = centre_mm - other.mesh.centroid_mm
+    to_own_mm = own.mesh.centroid_mm - other.mesh.centroid_mm
     elsewhere = TriangleMesh(other.mesh.vertices_mm + to_own_mm, other.mesh.faces)
     yield replace(other, mesh=elsewhere), targets_mm
-    mirrored_mm, moved_mm = (
-        centre_mm + (one - centre_mm) * (-1.0, 1.0, 1.0) for one in (mesh.vertices_mm, targets_mm)
-    )
-    yield replace(own, mesh=TriangleMesh(mirrored_mm, mesh.faces[:, ::-1])), moved_mm
+    yield stretch_bone(own, targets_mm, np.array([-1.0, 1.0, 1.0]))
     for size in _SIZES:
-        grown_mm, moved_mm = (
-            centre_mm + size * (one - centre_mm) for one in (mesh.vertices_mm, targets_mm)
-        )
-        yield replace(own, mesh=TriangleMesh(grown_mm, mesh.faces)), moved_mm
+        yield stretch_bone(own, targets_mm, np.full(3, size))
 
 
 def _follow(
@@ -184,7 +170,7 @@ def _follow(
 def _judge_frame(
     tracker: BimccTracker, frame: StereoFrame, start: RigidTransform, goal: Goal
 ) -> tuple[RigidTransform, Evidence, Verdict] | None:
-    log = Log()
+    log = DecisionLog()
     usual, judging.decide = judging.decide, log.decide
     try:
         state = TrackState.at_rest(start, frame.captured_ns)

@@ -21,7 +21,7 @@ from navapp.registration.verdict import (
 )
 from navapp.tracking import Goal
 from navapp.values import FrameTimings, PoseEstimate, Reason, Status, TrackedFrame, Verdict
-from navapp.values.verdicts import CAUSES
+from navapp.values.reasons import CAUSES
 
 DOCS = Path(__file__).parents[2] / "docs" / "how" / "registration.md"
 POSE = RigidTransform.identity("left_rect", "femur")

@@ -25,19 +25,26 @@ class Found:
         yield from self._tracker.near.find_on_model(replace(frame, start=pose))
 
 
-def look_again(off_mm: float, *reasons: Reason) -> tuple[TrackedFrame, Found]:
-    """A doubted answer at the true pose, after a start that was so far off."""
+def found_at_the_truth() -> tuple[BimccTracker, Found, Frame, TrackedFrame]:
+    """A tracker, its search without highlights, and the answer at the true pose of a frame."""
     a = room()
     picture = a.frames[0]
     tracker = BimccTracker(a.rig, a.tracker.model.bone)
-    found = Found(tracker)
-    tracker.highlights = found
-    truth = a.truth(picture)
-    frame = tracker.begin(picture.left, picture.right, truth, Stopwatch())
-    fit = next(iter(tracker.near.find_on_model(frame)))
-    answer = tracker.judge.judge(frame, fit, GOAL)
-    verdict = replace(answer.verdict, status=Status.DEGRADED, reasons=reasons, coverage=0.1)
-    doubted = replace(answer, verdict=verdict)
+    tracker.highlights = found = Found(tracker)
+    frame = tracker.begin(picture.left, picture.right, a.truth(picture), Stopwatch())
+    answer = tracker.judge.judge(frame, next(iter(tracker.near.find_on_model(frame))), GOAL)
+    return tracker, found, frame, answer
+
+
+def doubt(answer: TrackedFrame, coverage: float, *reasons: Reason) -> TrackedFrame:
+    verdict = replace(answer.verdict, status=Status.DEGRADED, reasons=reasons, coverage=coverage)
+    return replace(answer, verdict=verdict)
+
+
+def look_again(off_mm: float, *reasons: Reason) -> tuple[TrackedFrame, Found]:
+    """A doubted answer at the true pose, after a start that was so far off."""
+    tracker, found, frame, answer = found_at_the_truth()
+    doubted = doubt(answer, 0.1, *reasons)
     frame = replace(frame, start=frame.start.move((off_mm, 0, 0, 0, 0, 0), (0.0, 0.0, 0.0)))
     (best,) = FirstRegistration(tracker)._look_again(frame, [doubted], GOAL)
     return best, found
@@ -71,19 +78,9 @@ def test_what_the_search_for_a_buried_bone_finds_is_looked_at_again(
     said_before: Reason, is_found: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The right pose of a glossy bone may be found by it alone, unless it was doubted before."""
-    a = room()
-    picture = a.frames[0]
-    tracker = BimccTracker(a.rig, a.tracker.model.bone)
-    tracker.highlights = Found(tracker)
+    tracker, _, frame, answer = found_at_the_truth()
     registration = FirstRegistration(tracker)
-    frame = tracker.begin(picture.left, picture.right, a.truth(picture), Stopwatch())
-    right = tracker.judge.judge(frame, next(iter(tracker.near.find_on_model(frame))), GOAL)
-
-    def doubted(reason: Reason, coverage: float) -> TrackedFrame:
-        verdict = replace(right.verdict, status=Status.DEGRADED, coverage=coverage)
-        return replace(right, verdict=replace(verdict, reasons=(reason,)))
-
-    first, buried = doubted(said_before, 0.1), doubted(Reason.SURFACE_MISFIT, 0.5)
+    first, buried = doubt(answer, 0.1, said_before), doubt(answer, 0.5, Reason.SURFACE_MISFIT)
     monkeypatch.setattr(registration, "_judge_distinct", lambda *_: [first])
     monkeypatch.setattr(registration, "_look_again", only_once(registration._look_again))
     monkeypatch.setattr(registration, "_judge_buried", lambda *_: buried)
@@ -151,13 +148,8 @@ def test_behind_a_hand_what_is_seen_without_highlights_does_not_count(
 def test_an_ok_answer_is_replaced_by_one_that_fits_better_alone(
     spread_ratio: float, is_replaced: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    a = room()
-    picture = a.frames[0]
-    tracker = BimccTracker(a.rig, a.tracker.model.bone)
-    tracker.highlights = Found(tracker)
+    tracker, _, frame, answer = found_at_the_truth()
     monkeypatch.setattr(bimcc_tracker, "is_worth_a_second_look", lambda _: True)
-    frame = tracker.begin(picture.left, picture.right, a.truth(picture), Stopwatch())
-    answer = tracker.judge.judge(frame, next(iter(tracker.near.find_on_model(frame))), GOAL)
     assert answer.verdict.status is Status.OK
     loose = replace(answer, verdict=replace(answer.verdict, spread_ratio=spread_ratio))
     assert tracker.look_again(frame, loose, GOAL, frame.start).is_matte is is_replaced

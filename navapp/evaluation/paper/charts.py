@@ -9,7 +9,7 @@ import numpy as np
 from calibration.report.plots import draw_svg
 from navapp.evaluation.paper.cases import SITUATIONS, STAGE_NAMES, SituationName
 from navapp.evaluation.paper.published import Published, find_published
-from navapp.evaluation.paper.rows import Row
+from navapp.evaluation.paper.rows import Row, find_ours
 from navapp.geometry.transform import FloatArray
 from navapp.tracking import Method
 
@@ -54,12 +54,8 @@ def draw_stages(rows: Sequence[Row]) -> str:
 def _draw_by_stage(axes: Any, rows: Sequence[Row], value_of: Callable[[Row], float | None]) -> None:
     for number, (situation, colour) in enumerate(zip(SITUATIONS, _SITUATION_COLOURS, strict=True)):
         for place, stage in enumerate(STAGE_NAMES):
-            values = [
-                value
-                for row in rows
-                if (row.method, row.case.stage, row.case.situation) == ("bimcc", stage, situation)
-                and (value := value_of(row)) is not None
-            ]
+            found = [value_of(row) for row in find_ours(rows, stage, situation)]
+            values = [value for value in found if value is not None]
             at = place + 0.2 * (number - 1.5)
             if not values:
                 axes.text(at, 0.0, "none", ha="center", va="bottom", fontsize=6, rotation=90)

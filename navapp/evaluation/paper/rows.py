@@ -70,6 +70,12 @@ class Row:
         }
 
 
+def find_ours(rows: Sequence[Row], stage: str, situation: str) -> list[Row]:
+    """Those of our method in one stage and situation, of all samples."""
+    wanted = ("bimcc", stage, situation)
+    return [row for row in rows if (row.method, row.case.stage, row.case.situation) == wanted]
+
+
 def make_row(
     case: Case, method: Method, done: Sequence[Done[CaseTest]], timed: Sequence[Done[CaseTest]]
 ) -> Row:

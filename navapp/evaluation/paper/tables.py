@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 
 from navapp.evaluation.paper.cases import SAMPLES, SITUATIONS, STAGE_NAMES, Case
 from navapp.evaluation.paper.published import CONTRADICTIONS, find_published
-from navapp.evaluation.paper.rows import Row
+from navapp.evaluation.paper.rows import Row, find_ours
 from navapp.evaluation.paper.summary import Judged
 from navapp.tracking import Method
 
@@ -115,26 +115,25 @@ def _format_stages(rows: Sequence[Row]) -> list[str]:
     ]
     for stage in STAGE_NAMES:
         for situation, told in SITUATIONS.items():
-            found = [
-                row
-                for row in rows
-                if (row.method, row.case.stage, row.case.situation) == ("bimcc", stage, situation)
-            ]
-            if not found:
-                continue
-            n_frames = sum(row.n_frames for row in found)
-            n_ok = sum(row.n_ok for row in found)
-            worst_mm = max(row.tre_worst_mm or 0.0 for row in found)
-            within = _pool(found, lambda row: row.coverage)
-            lines.append(
-                f"| {_STAGES[stage]} | {told.title} | {sum(len(row.seeds) for row in found)} | "
-                f"{n_frames} | {_percent(n_ok / max(n_frames, 1))} | "
-                f"{format_mm(_pool(found, lambda row: row.tre_mm))} | "
-                f"{format_mm(worst_mm if n_ok else None)} | "
-                f"{format_mm(_pool(found, lambda row: row.overlay_mm))} | "
-                f"{'-' if within is None else _percent(within)} |"
-            )
+            if found := find_ours(rows, stage, situation):
+                lines.append(f"| {_STAGES[stage]} | {told.title} | {_format_pooled(found)} |")
     return [*lines, ""]
+
+
+def _format_pooled(rows: Sequence[Row]) -> str:
+    """Cells of several cases together."""
+    n_frames, n_ok = sum(row.n_frames for row in rows), sum(row.n_ok for row in rows)
+    within = _pool(rows, lambda row: row.coverage)
+    cells = (
+        str(sum(len(row.seeds) for row in rows)),
+        str(n_frames),
+        _percent(n_ok / max(n_frames, 1)),
+        format_mm(_pool(rows, lambda row: row.tre_mm)),
+        format_mm(max((row.tre_worst_mm for row in rows if row.tre_worst_mm), default=None)),
+        format_mm(_pool(rows, lambda row: row.overlay_mm)),
+        "-" if within is None else _percent(within),
+    )
+    return " | ".join(cells)
 
 
 def _pool(rows: Sequence[Row], value_of: Callable[[Row], float | None]) -> float | None:
