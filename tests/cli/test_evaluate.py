@@ -168,7 +168,7 @@ def test_a_quick_look_at_one_case_from_end_to_end(quick) -> None:
     assert "1 tests, 1 at a time" in done.stderr
     assert {path.name for path in out.iterdir()} == {
         "settings.json", "tests", "times", "pictures", "tables.md", "report.html", "frames.csv",
-        "evaluate.json",
+        "stages.svg", "errors.svg", "evaluate.json",
     }  # fmt: skip
     assert len((out / "frames.csv").read_text().splitlines()) == 6
     assert "data:image/jpeg" in (out / "report.html").read_text()
