@@ -150,6 +150,7 @@ def _without_pose(reason: Reason, quantity: str) -> Rule:
 
 
 _PARTLY_CHOSEN = "tests.bench.wrong_plans; LOST chosen"
+_TRAINED = "tests.bench.judge_limits; LOST chosen"
 _HEALTH = "tests.bench.stereo_health"
 _RESIDUALS = "chosen; noise by tests.bench.correlated_residuals"
 
@@ -182,7 +183,7 @@ RULES = (
     Rule(Reason.SURFACE_MISFIT, "correlated residuals' variance over the noise of right poses",
          lambda e: e.correlated_ratio, 2.0, None, _RESIDUALS, doubts_place=True),
     Rule(Reason.COVERAGE_LOW, "what nothing hides: measured and agreeing",
-         lambda e: e.seen.open_coverage, 0.4, 0.25, _PARTLY_CHOSEN, is_below=True,
+         lambda e: e.seen.open_coverage, 0.2, 0.15, _TRAINED, is_below=True,
          doubts_place=True),
     Rule(Reason.COVERAGE_LOW, "the whole visible model: measured and agreeing",
          lambda e: e.seen.coverage, 0.15, 0.1, CHOSEN, is_below=True, doubts_place=True),
@@ -220,6 +221,8 @@ RULES = (
 )  # fmt: skip
 
 _AGAINST_PLACE = frozenset(rule.reason for rule in RULES if rule.doubts_place)
+# Of these, what a better view mends, and no better place.
+_LITTLE_SEEN = frozenset({Reason.COVERAGE_LOW, Reason.DEGENERATE})
 _OF_AGREEMENT = tuple(
     rule
     for rule in RULES
@@ -275,3 +278,8 @@ def is_worth_a_second_look(verdict: Verdict) -> bool:
 def is_place_doubted(verdict: Verdict) -> bool:
     """Whether something speaks against a pose's place; always when it is lost."""
     return verdict.status is Status.LOST or not _AGAINST_PLACE.isdisjoint(verdict.reasons)
+
+
+def is_misfit(verdict: Verdict) -> bool:
+    """Whether what is seen fits badly at a pose's place; that little is seen is no misfit."""
+    return not (_AGAINST_PLACE - _LITTLE_SEEN).isdisjoint(verdict.reasons)

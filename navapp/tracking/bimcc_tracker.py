@@ -13,6 +13,7 @@ from navapp.geometry.transform import RigidTransform
 from navapp.registration.verdict import (
     Goal,
     is_little_occluded,
+    is_misfit,
     is_place_doubted,
     is_worth_a_second_look,
 )
@@ -30,7 +31,16 @@ from navapp.tracking.search.near import NearSearch
 from navapp.tracking.search.whole_view import WholeViewSearch
 from navapp.tracking.surface_meter import NEAR_VIEW, SurfaceMeter
 from navapp.tracking.tracker import Tracker, TrackerSettings
-from navapp.values import AspectGraph, BoneModel, Prior, Reason, Status, Stopwatch, TrackedFrame
+from navapp.values import (
+    AspectGraph,
+    BoneModel,
+    Prior,
+    Reason,
+    Status,
+    Stopwatch,
+    TrackedFrame,
+    Verdict,
+)
 
 
 class BimccTracker(Tracker):
@@ -81,19 +91,19 @@ class BimccTracker(Tracker):
         # Predict where the bone will be.
         left_from_bone = state.predict(captured_ns, self.centre_mm)
         times = RowTimes.of_pair(self.meter, state, captured_ns, skew_ns)
-        best = None
+        # Rectify its box and depth band; the model's projection is the box of section 3.2.1.
+        frame = self.begin(left, right, left_from_bone, watch, NEAR_VIEW, times)
         if state.n_lost == 0:
-            # Rectify its box and depth band; the model's projection is the box of section 3.2.1.
-            frame = self.begin(left, right, left_from_bone, watch, NEAR_VIEW, times)
             best = self._follow(frame, state, goal, frame.start)
             best = self._follow_closer(left, right, frame, best, state, goal)
-        if best is None or best.verdict.status is Status.LOST:
+        else:
+            best = self.look_near(frame, goal)
+        if best.verdict.status is Status.LOST and state.is_search_after_loss_due:
             state = replace(state, box=self.boxes.follow(state.box, left))
             # Search where the box lies, and where the bone was expected.
             best = self.search_places(
                 left, right, self.boxes.starts(left_from_bone, state.box), self.after_loss.find,
-                goal, self.rectify_pose(left_from_bone),
-                best or self.judge.lost(Reason.BONE_LOST, watch), watch, state.n_lost, times,
+                goal, frame.start, best, watch, state.n_searches, times,
             )  # fmt: skip
         if best.verdict.status is not Status.OK:
             best = best.with_cause(self.find_cause(left, right, left_from_bone, state, best))
@@ -135,9 +145,12 @@ class BimccTracker(Tracker):
             # turns; check beside the fit; judge.
             frame = replace(frame, on_measured=checks.check)
             fits = self.near.find(frame)
-            best = self.judge_fits(frame, fits, goal, predicted, checks=checks)
+            best = self.judge_fits(
+                frame, fits, goal, predicted, checks=checks,
+                is_enough=lambda verdict: not _asks_for_more(verdict, state),
+            )  # fmt: skip
             best = self.look_again(frame, best, goal, predicted, checks)
-            if is_place_doubted(best.verdict):
+            if is_misfit(best.verdict):
                 may_search_long = state.is_search_due and is_worth_a_search(best)
                 frame = replace(frame, may_search_long=may_search_long)
                 more = self.buried.find(frame)
@@ -200,3 +213,12 @@ class BimccTracker(Tracker):
     ) -> list[TrackedFrame]:
         """Find the bone from a rough pose, a box or a cone: distinct candidates, best first."""
         return FirstRegistration(self).register(left, right, prior, goal, on_progress)
+
+
+def _asks_for_more(verdict: Verdict, state: TrackState) -> bool:
+    """Whether another place may fit better than one does.
+
+    Where only little of the bone is seen, that is asked as rarely as a long search is made.
+    """
+    is_bad = verdict.status is Status.LOST or is_misfit(verdict)
+    return is_bad or (is_place_doubted(verdict) and state.is_search_due)

@@ -15,9 +15,9 @@ class RestSettings:
     """When a pose rests on the model; all chosen, reach in `tests.bench.follower_reach`."""
 
     max_sampled: int = 3  # rounds on samples of the model, at most
-    near_mm: float = 0.2  # a move of less ends the sampling
+    near_mm: float = 0.4  # a move of less ends the sampling
     max_rounds: int = 6  # rounds of matching and fitting, at most
-    rest_mm: float = 0.05  # after a move of less, the bone rests
+    rest_mm: float = 0.1  # after a move of less, the bone rests
 
 
 class Follower:

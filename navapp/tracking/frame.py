@@ -44,7 +44,7 @@ class Frame:
     rectify_coloured: RectifyBox | None = None
     # when the rows of the pictures see a moving bone; None where they see it all at once.
     times: RowTimes | None = None
-    n_lost: int = 0  # frames lost before this one; in odd ones a search goes further off
+    n_searches: int = 0  # made since the bone was lost; odd ones go further off
     may_search_long: bool = True  # a search that takes as long as many frames is worth it
     # told what is measured on all of the model near `start`, and at which pose.
     on_measured: OnMeasured = ignore

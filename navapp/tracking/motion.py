@@ -15,9 +15,9 @@ _DAMPING = 0.7
 _FADING = 0.8
 # A gap longer than this says nothing about the velocity any more.
 _MAX_GAP_NS = 400_000_000
-# A search for a buried bone takes as long as many frames. While it finds nothing it is made again
-# after twice as many frames, at most so many.
-_MOST_BETWEEN_SEARCHES = 8
+# A search takes as long as many frames. While it finds nothing it is made again after twice as many
+# frames, at most so many: where the bone is in doubt, and where it is lost.
+_MOST_BETWEEN_SEARCHES, _MOST_BETWEEN_SEARCHES_LOST = 8, 4
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,8 +51,17 @@ class TrackState:
     @property
     def is_search_due(self) -> bool:
         """Whether the next frame, if in doubt as well, is worth a long search: ever more rarely."""
-        n = self.n_doubted
-        return n % _MOST_BETWEEN_SEARCHES == 0 or (n < _MOST_BETWEEN_SEARCHES and n & (n - 1) == 0)
+        return _is_due(self.n_doubted, _MOST_BETWEEN_SEARCHES)
+
+    @property
+    def is_search_after_loss_due(self) -> bool:
+        """Whether the next frame, if lost as well, is searched where the bone was not expected."""
+        return _is_due(self.n_lost, _MOST_BETWEEN_SEARCHES_LOST)
+
+    @property
+    def n_searches(self) -> int:
+        """Searches after the loss that were due in the frames since."""
+        return sum(_is_due(n, _MOST_BETWEEN_SEARCHES_LOST) for n in range(self.n_lost))
 
     def predict(self, captured_ns: int, centre_mm: FloatArray) -> RigidTransform:
         """The pose expected at a moment; where it was last seen after a long gap."""
@@ -129,6 +138,11 @@ class TrackState:
             return np.zeros(6)
         before = np.zeros(6) if self.velocity is None else self.velocity
         return np.maximum(np.abs(velocity - before), _FADING * self.velocity_change)
+
+
+def _is_due(n: int, most: int) -> bool:
+    """Whether n is one of 0, 1, 2, 4, 8, ..., which go on in steps of `most`, a power of two."""
+    return n % most == 0 or (n < most and n & (n - 1) == 0)
 
 
 def is_worth_a_search(tracked: TrackedFrame) -> bool:

@@ -153,15 +153,19 @@ class Tracker(ABC):
         left_from_bone = state.predict(captured_ns, self.centre_mm)
         times = RowTimes.of_pair(self.meter, state, captured_ns, skew_ns)
         frame = self.begin(left, right, left_from_bone, watch, NEAR_VIEW, times)
-        with self.begin_checks(frame) as checks:
-            fits = self.find_for_glance(frame)
-            best = self.judge_fits(
-                frame, fits, goal, frame.start, checks=checks,
-                is_enough=lambda verdict: not is_place_doubted(verdict),
-            )  # fmt: skip
+        best = self.look_near(frame, goal)
         tracked, after = self.update(best.with_cause(state.cause), state, left, captured_ns, watch)
         # Nothing was searched for, so the next search is due at once.
         return tracked, replace(after, n_doubted=0)
+
+    def look_near(self, frame: Frame, goal: Goal) -> TrackedFrame:
+        """The bone near the start of a frame, without any search."""
+        with self.begin_checks(frame) as checks:
+            fits = self.find_for_glance(frame)
+            return self.judge_fits(
+                frame, fits, goal, frame.start, checks=checks,
+                is_enough=lambda verdict: not is_place_doubted(verdict),
+            )  # fmt: skip
 
     def assess(
         self, left: Image, right: Image, left_from_bone: RigidTransform, goal: Goal
@@ -260,16 +264,16 @@ class Tracker(ABC):
         predicted: RigidTransform,
         best: TrackedFrame,
         watch: Stopwatch,
-        n_lost: int = 0,
+        n_searches: int = 0,
         times: RowTimes | None = None,
     ) -> TrackedFrame:
         """The best of an answer and of searches around places (left camera from bone), until an OK.
 
-        Only around the first place a search goes further off, as `n_lost` asks for.
+        Only around the first place a search goes further off, as `n_searches` asks for.
         """
         for number, place in enumerate(places):
             frame = self.begin(left, right, place, watch, times=times)
-            frame = replace(frame, n_lost=0 if number else n_lost)
+            frame = replace(frame, n_searches=0 if number else n_searches)
             best = self.judge_fits(frame, find(frame), goal, predicted, best)
             if best.verdict.status is Status.OK:
                 break

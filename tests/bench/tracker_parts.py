@@ -31,9 +31,8 @@ class TrackerParts(BimccTracker):
         return Frame(self.meter.rectify(left, right, start, margins), start, Stopwatch())
 
     def find(self, frame: Frame) -> Fit | None:
-        """The surface's fit near the start; None out of view."""
-        (fit,) = self.near.find(frame)
-        return fit
+        """Where the model rests near the start; None out of view."""
+        return next(self.near.find(frame))
 
     def verdict(self, frame: Frame, fit: Fit) -> Verdict:
         """What is said of a fit, by what is seen alone."""

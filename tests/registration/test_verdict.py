@@ -16,6 +16,7 @@ from navapp.registration.verdict import (
     Rule,
     decide,
     is_bone_absent,
+    is_misfit,
     is_place_doubted,
     is_worth_a_second_look,
 )
@@ -92,7 +93,7 @@ ROWS = (
     Row(Reason.AMBIGUOUS, said(Reason.AMBIGUOUS), 0, None, 1),
     Row(Reason.CUES_DISAGREE, said(Reason.CUES_DISAGREE), 0, None, 1),
     Row(Reason.SURFACE_MISFIT, lambda x: known(correlated_ratio=x), 2.0, None),
-    Row(Reason.COVERAGE_LOW, lambda x: seen(coverage=x), 0.4, 0.25, -1e-6),
+    Row(Reason.COVERAGE_LOW, lambda x: seen(coverage=x), 0.2, 0.15, -1e-6),
     Row(Reason.COVERAGE_LOW, lambda x: seen(coverage=x, hidden_fraction=0.84), 0.15, 0.1, -1e-6),
     Row(Reason.SEEN_THROUGH, lambda x: seen(behind_fraction=x), 0.05, 0.15),
     Row(Reason.OUTLIERS, lambda x: seen(inlier_fraction=x), 0.8, 0.5, -1e-6),
@@ -258,8 +259,8 @@ def test_what_the_plan_costs_is_not_held_against_the_view() -> None:
     ("changes", "expected"),
     [
         ({}, False),
-        ({"coverage": 0.24}, True),
-        ({"coverage": 0.26}, False),
+        ({"coverage": 0.14}, True),
+        ({"coverage": 0.16}, False),
         ({"coverage": 0.09, "hidden_fraction": 0.9}, True),
         ({"behind_fraction": 0.16}, True),
         ({"behind_fraction": 0.14}, False),
@@ -282,8 +283,11 @@ def test_some_reasons_speak_against_the_place(reason: Reason) -> None:
         Reason.SEEN_THROUGH,
         Reason.OUTLIERS,
     }
-    assert is_place_doubted(Verdict(Status.DEGRADED, 0.5, (reason,))) is (reason in speaks)
+    doubted = Verdict(Status.DEGRADED, 0.5, (reason,))
+    assert is_place_doubted(doubted) is (reason in speaks)
     assert is_place_doubted(Verdict(Status.LOST, None, (reason,)))
+    # No better place mends that little of the bone is seen.
+    assert is_misfit(doubted) is (reason in speaks - {Reason.COVERAGE_LOW, Reason.DEGENERATE})
 
 
 def test_the_cause_comes_first_and_once_and_an_ok_has_none() -> None:

@@ -1,6 +1,7 @@
 """One bone followed from frame to frame by the production tracker."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -128,7 +129,7 @@ def lost_far_away(a: Room, n_seen: int = 2) -> TrackState:
     for frame in a.frames[:n_seen]:
         _, state = a.tracker.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
     away = truth.move((70.0, 0, 0, 0, 0, 0), truth.apply(a.tracker.centre_mm))
-    return replace(state, left_from_bone=away, n_lost=5)
+    return replace(state, left_from_bone=away, n_lost=4)
 
 
 def test_the_box_leads_back_to_a_lost_bone() -> None:
@@ -192,6 +193,26 @@ def test_a_frame_that_is_tracked_asks_for_all_that_a_glance_does_not() -> None:
         never_searching(a.tracker.near).track(
             frame.left, frame.right, frame.captured_ns, state, GOAL
         )
+
+
+@pytest.mark.parametrize(
+    ("n_lost", "searches"), [(1, [1, 0]), (2, [2, 0]), (3, []), (4, [3, 0]), (5, [])]
+)
+def test_a_lost_bone_is_looked_for_in_every_frame_and_searched_in_some(
+    n_lost: int, searches: list[int]
+) -> None:
+    a, asked = room(), []
+    state, picture = replace(lost_far_away(a), n_lost=n_lost), a.frames[2]
+    tracker = BimccTracker(a.rig, a.tracker.model.bone)
+    tracker.after_loss = SimpleNamespace(find=lambda frame: asked.append(frame.n_searches) or [])
+    given = picture.left, picture.right, picture.captured_ns
+    tracker.track(*given, state, GOAL)
+    # Where its box lies, which may go further off, and where it was expected.
+    assert asked == searches
+    near = replace(state, left_from_bone=a.truth(picture))
+    found, after = tracker.track(*given, near, GOAL)
+    assert found.verdict.status is Status.OK
+    assert after.n_lost == 0
 
 
 @pytest.mark.parametrize("n_lost", [0, 5])

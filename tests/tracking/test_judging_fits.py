@@ -33,7 +33,7 @@ def tracked(a: Room, tracker: BimccTracker) -> TrackedFrame:
 def found_at_the_truth(a: Room) -> tuple[Frame, PairChecks, Fit]:
     taken = a.frames[0]
     frame = a.tracker.begin(taken.left, taken.right, a.truth(taken), Stopwatch(), NEAR_VIEW)
-    (fit,) = a.tracker.near.find(frame)
+    fit = next(a.tracker.near.find(frame))
     return frame, PairChecks(a.tracker.meter, frame.pair), fit
 
 

@@ -1,6 +1,6 @@
-"""After a loss: around the last pose, and in every other lost frame further off.
+"""After a loss: around the last pose, and in every other search further off.
 
-A frame has no time for all starts further off: each tries a part of them that is spread over all
+A search has no time for all starts further off: each tries a part of them that is spread over all
 directions, until every start had its turn.
 """
 
@@ -28,8 +28,8 @@ class SearchAfterLoss:
         self._meter, self._near, self._scorer = meter, near, scorer
 
     def find(self, frame: Frame) -> list[Fit | None]:
-        """Around the start; or in every other lost frame further off. None out of view."""
-        starts = make_starts_after_loss(frame.start, self._meter.model.centre_mm, frame.n_lost)
+        """Around the start; or in every other search further off. None out of view."""
+        starts = make_starts_after_loss(frame.start, self._meter.model.centre_mm, frame.n_searches)
         measured = None
         if starts:
             measured = self._meter.measure_freely(frame.pair, frame.start, WIDE_VIEW)
@@ -44,18 +44,18 @@ class SearchAfterLoss:
 
 
 def make_starts_after_loss(
-    last: RigidTransform, centre_mm: FloatArray, n_lost: int
+    last: RigidTransform, centre_mm: FloatArray, n_searches: int
 ) -> list[RigidTransform]:
-    """Starts further off than the last pose; none in every other frame.
+    """Starts further off than the last pose; none in every other search.
 
     Args:
         last: pose of the bone when it was seen last.
         centre_mm: (3,) of the model, in bone coordinates.
-        n_lost: frames lost before this one.
+        n_searches: made since the bone was lost, before this one.
     """
-    if n_lost % 2 == 0:
+    if n_searches % 2 == 0:
         return []
-    part = n_lost // 2 % _PARTS
+    part = n_searches // 2 % _PARTS
     return _all_starts(last, last.apply(centre_mm))[part::_PARTS]
 
 

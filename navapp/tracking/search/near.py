@@ -11,10 +11,10 @@ from navapp.tracking.surface_meter import NEAR_BOX, Margins, Measurement, Surfac
 _NEARBY_SETTINGS = FREE_SETTINGS._replace(widest_mm=3.0)
 
 
-# All chosen. When so much of the model is matched, the bone is where it was expected.
+# Chosen. When less of the model's samples is matched, the bone is elsewhere.
+LEAST_FRACTION = 0.3
+# Chosen. When so much of the model is matched after a free search, no second one is made nearby.
 SURE_FRACTION = 0.45
-# When so much is, something may hide the rest: it is there if the fit moved it by at most STAY_MM.
-LEAST_FRACTION, STAY_MM = 0.3, 0.7
 
 
 class NearSearch:
@@ -29,21 +29,20 @@ class NearSearch:
         self._meter, self._score = meter, score
         self._follower = Follower(meter)
 
-    def find(self, frame: Frame) -> list[Fit | None]:
-        """The one fit that explains most; None out of view.
+    def find(self, frame: Frame) -> Iterator[Fit | None]:
+        """Where the model rests on the pictures; then, if asked, what explains more. None: no view.
 
-        Matching on the model is exact but sees only what is close. When samples of it say that the
-        bone is elsewhere, or it is half hidden or moved, the surface is measured freely as well,
-        and what explains more of the model stands.
+        Matching on the model is exact but sees only what is close. Whoever is not content with that
+        asks on: then the surface is measured freely as well.
         """
         stayed = self._follower.follow(
             frame, frame.start, LEAST_FRACTION, on_measured=frame.on_measured
         )
-        if stayed is not None and self._is_here(stayed, frame.start):
-            return [stayed]
+        if stayed is not None:
+            yield stayed
         found = self.find_freely(frame, NEAR_BOX)
-        fits = [fit for fit in (stayed, found) if fit is not None]
-        return [max(fits, key=self._score) if len(fits) > 1 else next(iter(fits), None)]
+        if stayed is None or (found is not None and self._score(found) > self._score(stayed)):
+            yield found
 
     def find_on_model(self, frame: Frame) -> Iterator[Fit]:
         """Fits on the model alone: from samples of it first, then from all of it at once."""
@@ -71,14 +70,6 @@ class NearSearch:
         on it even from the truth.
         """
         return self._fit(frame, measured, pose, _NEARBY_SETTINGS)
-
-    def _is_here(self, fit: Fit, expected: RigidTransform) -> bool:
-        """Enough of the model is matched, or what is matched is where it was expected."""
-        matched = fit.measured.matched_fraction
-        if matched >= SURE_FRACTION:
-            return True
-        moved_mm = expected.mean_motion_mm(fit.pose, self._meter.model.hull_mm)
-        return matched >= LEAST_FRACTION and moved_mm <= STAY_MM
 
     def _fit(
         self, frame: Frame, measured: Measurement, start: RigidTransform, settings: BimccSettings

@@ -20,12 +20,14 @@ def far_mm(start: RigidTransform) -> float:
 
 
 def cycle() -> list[list[RigidTransform]]:
-    return [make_starts_after_loss(LAST, CENTRE, n_lost) for n_lost in range(1, 21, 2)]
+    return [make_starts_after_loss(LAST, CENTRE, n_searches) for n_searches in range(1, 21, 2)]
 
 
-def test_the_first_and_every_other_frame_looks_where_it_was() -> None:
-    assert all(make_starts_after_loss(LAST, CENTRE, n_lost) == [] for n_lost in range(0, 40, 2))
-    assert all(make_starts_after_loss(LAST, CENTRE, n_lost) for n_lost in range(1, 40, 2))
+def test_the_first_and_every_other_search_looks_where_it_was() -> None:
+    assert all(
+        make_starts_after_loss(LAST, CENTRE, n_searches) == [] for n_searches in range(0, 40, 2)
+    )
+    assert all(make_starts_after_loss(LAST, CENTRE, n_searches) for n_searches in range(1, 40, 2))
 
 
 def test_every_start_has_its_turn_and_then_again() -> None:
@@ -36,7 +38,7 @@ def test_every_start_has_its_turn_and_then_again() -> None:
         np.testing.assert_array_equal(one.matrix, other.matrix)
 
 
-def test_no_frame_has_much_more_work_than_another() -> None:
+def test_no_search_has_much_more_work_than_another() -> None:
     sizes = [len(part) for part in cycle()]
     assert max(sizes) - min(sizes) <= 1
     assert max(sizes) <= 25
@@ -60,5 +62,5 @@ def test_what_does_not_look_further_off_searches_where_it_was() -> None:
     near = SimpleNamespace(find_freely=lambda *given: given)
     meter = SimpleNamespace(model=SimpleNamespace(centre_mm=CENTRE))
     search = SearchAfterLoss(meter, near, scorer=None)
-    frame = Frame(None, LAST, Stopwatch(), n_lost=2)
+    frame = Frame(None, LAST, Stopwatch(), n_searches=2)
     assert list(search.find(frame)) == [(frame, WIDE_BOX)]
