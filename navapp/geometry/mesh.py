@@ -134,6 +134,13 @@ def join_meshes(*meshes: TriangleMesh) -> TriangleMesh:
     )
 
 
+def drop_unused_vertices(mesh: TriangleMesh) -> TriangleMesh:
+    """The same triangles without vertices that none of them has."""
+    used, faces = np.unique(mesh.faces, return_inverse=True)
+    faces = faces.reshape(mesh.faces.shape).astype(np.int32)
+    return TriangleMesh(mesh.vertices_mm[used], faces, mesh.normals[used])
+
+
 def vertex_normals(vertices_mm: FloatArray, faces: IntArray) -> FloatArray:
     """(V, 3) unit normals: the mean of the adjacent faces' normals, weighted by their area.
 

@@ -35,6 +35,11 @@ def is_closed(mesh: TriangleMesh) -> bool:
     return bool(has_pairs and mesh.volume_mm3() > 0.0)
 
 
+def count_outward(mesh: TriangleMesh) -> int:
+    """How many triangles of a mesh show no inner side: all of a closed one, else none."""
+    return len(mesh.faces) if is_closed(mesh) else 0
+
+
 def simplify(mesh: TriangleMesh, n_vertices: int, within_mm: float) -> TriangleMesh:
     """A mesh of about so many vertices, or of as many as the distance asks for.
 

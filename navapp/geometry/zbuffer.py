@@ -43,7 +43,7 @@ def render(
     camera: Camera,
     *,
     is_whole: bool = True,
-    is_closed: bool = False,
+    n_outward: int = 0,
 ) -> RenderedView:
     """The mesh as that camera sees it, lens distortion included (exact at the vertices).
 
@@ -52,10 +52,10 @@ def render(
         camera_from_mesh: its pose.
         camera: that sees it.
         is_whole: the whole picture; otherwise only the box around the mesh, empty out of view.
-        is_closed: as for `render_rectified`.
+        n_outward: as for `render_rectified`.
     """
     projected = ProjectedMesh.of(camera_from_mesh.apply(mesh.vertices_mm), mesh.faces, camera)
-    return projected.render(is_whole=is_whole, is_closed=is_closed)
+    return projected.render(is_whole=is_whole, n_outward=n_outward)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,10 +77,10 @@ class ProjectedMesh:
         whole = Box(0, 0, camera.width, camera.height)
         return cls(pixels, points_mm[:, 2].copy(), faces, box, whole)
 
-    def render(self, *, is_whole: bool = False, is_closed: bool = False) -> RenderedView:
+    def render(self, *, is_whole: bool = False, n_outward: int = 0) -> RenderedView:
         """Options as of the function `render`."""
         box = self.whole if is_whole else self.box
-        return _raster(self.pixels - (box.x, box.y), self.depths_mm, self.faces, box, is_closed)
+        return _raster(self.pixels - (box.x, box.y), self.depths_mm, self.faces, box, n_outward)
 
 
 def render_rectified(
@@ -89,7 +89,7 @@ def render_rectified(
     geometry: RectifiedGeometry,
     box: Box,
     *,
-    is_closed: bool = False,
+    n_outward: int = 0,
 ) -> RenderedView:
     """The mesh in a box of the rectified left view.
 
@@ -98,8 +98,8 @@ def render_rectified(
         rectified_from_mesh: its pose.
         geometry: of the rectified pair.
         box: part of the left view.
-        is_closed: the mesh has no border, and its triangles look outward: half of them need not be
-            drawn.
+        n_outward: so many triangles, the first, look outward and show no inner side: half of them
+            need not be drawn.
     """
     pixels, depths_mm = np.empty((len(mesh.vertices_mm), 2)), np.empty(len(mesh.vertices_mm))
     project_points(
@@ -107,7 +107,7 @@ def render_rectified(
         geometry.focal_px, (geometry.centre_x_px - box.x, geometry.centre_y_px - box.y),
         pixels, depths_mm,
     )  # fmt: skip
-    return _raster(pixels, depths_mm, mesh.faces, box, is_closed)
+    return _raster(pixels, depths_mm, mesh.faces, box, n_outward)
 
 
 def bounds_of(
@@ -140,7 +140,7 @@ def _raster(
     depths_mm: FloatArray,
     faces: NDArray[np.int32],
     box: Box,
-    is_closed: bool = False,
+    n_outward: int = 0,
 ) -> RenderedView:
     """The triangles of vertices at pixels (V, 2) of the box, whose first pixel is (0, 0)."""
     height, width = max(box.height, 0), max(box.width, 0)
@@ -152,7 +152,7 @@ def _raster(
 
     if not box.is_empty:
         draw = partial(
-            render_rows, pixels, depths_mm, writable, is_closed, inverse_depth=inverse_depth,
+            render_rows, pixels, depths_mm, writable, n_outward, inverse_depth=inverse_depth,
             face_code=face_code.view(np.float32), coded=face_code, depth=depth,
             face_index=face_index,
         )  # fmt: skip

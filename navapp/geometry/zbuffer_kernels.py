@@ -81,7 +81,7 @@ def raster_nearest(
     inverse_depth: NDArray[np.float32],
     face_code: NDArray[np.float32],
     band: tuple[int, int],
-    is_closed: bool,
+    n_outward: int,
 ) -> None:
     """Draw triangles into an inverse-depth buffer; the larger value (nearer surface) stays.
 
@@ -93,7 +93,7 @@ def raster_nearest(
             columns more than count.
         face_code: (h, pitch) in place: the bits of the triangle's number, an int32.
         band: first row to draw, and after the last.
-        is_closed: the mesh shows no inner side: triangles seen from behind are left out.
+        n_outward: so many triangles, the first, show no inner side: from behind they are left out.
 
     1/z is linear in the picture, so it is what is interpolated. Each weight is taken from the two
     ends of its edge: a neighbour computes the same number with the other sign, so that no pixel on
@@ -111,7 +111,7 @@ def raster_nearest(
         cx, cy = pixels[c, 0], pixels[c, 1]
         area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
         # Rows count downwards: counter-clockwise from outside is a negative area. False of NaN.
-        if not (area < -1e-12 or (area > 1e-12 and not is_closed)):
+        if not (area < -1e-12 or (area > 1e-12 and f >= n_outward)):
             continue
         za, zb, zc = depths[a], depths[b], depths[c]
         if not (za > 1e-6 and zb > 1e-6 and zc > 1e-6):
@@ -199,7 +199,7 @@ def render_rows(
     pixels: NDArray[np.float64],
     depths: NDArray[np.float64],
     faces: NDArray[np.int32],
-    is_closed: bool,
+    n_outward: int,
     band: tuple[int, int],
     inverse_depth: NDArray[np.float32],
     face_code: NDArray[np.float32],
@@ -208,5 +208,5 @@ def render_rows(
     face_index: NDArray[np.int32],
 ) -> None:
     """`raster_nearest`, then `tell_depth`; `coded` is `face_code` read as whole numbers."""
-    raster_nearest(pixels, depths, faces, inverse_depth, face_code, band, is_closed)
+    raster_nearest(pixels, depths, faces, inverse_depth, face_code, band, n_outward)
     tell_depth(inverse_depth, coded, band, depth, face_index)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from navapp.geometry.box import Box
 from navapp.geometry.camera import Camera
 from navapp.geometry.mesh import TriangleMesh
-from navapp.geometry.simplify import drawn, is_closed
+from navapp.geometry.simplify import count_outward, drawn
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer import ProjectedMesh, RenderedView, find_known_range
 from navapp.overlay.blend_kernels import find_weights
@@ -128,7 +128,7 @@ class Scene:
 
     def render(self, mesh: TriangleMesh) -> RenderedView:
         """A mesh in the bone's coordinates; only the box around it."""
-        return self._project(mesh).render(is_closed=is_closed(mesh))
+        return self._project(mesh).render(n_outward=count_outward(mesh))
 
     def _project(self, mesh: TriangleMesh) -> ProjectedMesh:
         return ProjectedMesh.of(self.to_camera(mesh.vertices_mm), mesh.faces, self.camera)
@@ -140,7 +140,7 @@ class Scene:
     @cached_property
     def view(self) -> RenderedView:
         """The bone's part of the picture; rendered once."""
-        return self._projected.render(is_closed=is_closed(self.drawn_mesh))
+        return self._projected.render(n_outward=count_outward(self.drawn_mesh))
 
     @cached_property
     def box(self) -> Box:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from navapp.geometry.box import Box
-from navapp.geometry.mesh import TriangleMesh, join_meshes
+from navapp.geometry.mesh import TriangleMesh, drop_unused_vertices, join_meshes
 from navapp.geometry.mesh_edges import open_border
 from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.simplify import drawn, is_closed
@@ -58,7 +58,17 @@ class RegistrationModel:
     def rendered_mesh(self) -> TriangleMesh:
         """`seen_mesh` in fewer triangles where it has many, and its lid: what is rendered."""
         mesh, lid = drawn(self.seen_mesh), self.bone.lid
-        return mesh if lid is None else join_meshes(mesh, lid)
+        return mesh if lid is None else drop_unused_vertices(join_meshes(mesh, lid))
+
+    @cached_property
+    def _n_outward(self) -> int:
+        """Triangles rendered of which nobody sees the inner side: those of a whole bone, not cut.
+
+        What cuts leave open is behind the lid.
+        """
+        n_lid = 0 if self.bone.lid is None else len(self.bone.lid.faces)
+        is_whole = is_closed(self.bone.mesh if n_lid > 0 else self.rendered_mesh)
+        return len(self.rendered_mesh.faces) - n_lid if is_whole else 0
 
     def render(
         self,
@@ -70,7 +80,7 @@ class RegistrationModel:
     ) -> RenderedView:
         """The bone at a pose in a box of the rectified left view; its lid hides, unseen or seen."""
         mesh, lid = self.rendered_mesh, self.bone.lid
-        view = render_rectified(mesh, camera_from_bone, geometry, box, is_closed=is_closed(mesh))
+        view = render_rectified(mesh, camera_from_bone, geometry, box, n_outward=self._n_outward)
         if lid is not None and not has_lid:
             is_lid = view.face_index >= len(mesh.faces) - len(lid.faces)
             view.depth_mm[is_lid], view.face_index[is_lid] = np.nan, -1

@@ -85,13 +85,20 @@ def test_the_edges_of_a_triangle_on_pixel_centres_belong_to_it():
 def test_a_closed_mesh_looks_the_same_without_its_far_side():
     mesh, left_rect_from_bone = sphere(30.0, 30), pose()
     whole = seen(mesh, left_rect_from_bone)
-    facing = render_rectified(mesh, left_rect_from_bone, GEOMETRY, whole.box, is_closed=True)
+    n_faces = len(mesh.faces)
+    facing = render_rectified(mesh, left_rect_from_bone, GEOMETRY, whole.box, n_outward=n_faces)
     np.testing.assert_array_equal(facing.face_index, whole.face_index)
     np.testing.assert_array_equal(facing.depth_mm, whole.depth_mm)
     # Turned inside out, only its far side is drawn.
-    inside = render_rectified(mesh.flip(), left_rect_from_bone, GEOMETRY, whole.box, is_closed=True)
+    given = mesh.flip(), left_rect_from_bone, GEOMETRY, whole.box
+    inside = render_rectified(*given, n_outward=n_faces)
     middle = np.isfinite(whole.depth_mm)
     assert (inside.depth_mm[middle] > whole.depth_mm[middle] + 1.0).mean() > 0.9
+    # What comes after the outward ones is seen from both sides.
+    both = render_rectified(*given, n_outward=n_faces // 2)
+    is_near = both.depth_mm[middle] < whole.depth_mm[middle] + 1e-3
+    assert 0.1 < is_near.mean() < 0.9
+    assert (both.face_index[middle][is_near] >= n_faces // 2).all()
 
 
 def test_depth_agrees_with_ray_casting():

@@ -2,8 +2,6 @@
 
 import numpy as np
 
-from navapp.geometry.simplify import is_closed
-from navapp.geometry.zbuffer import render_rectified
 from navapp.tracking.contour import ContourRefiner
 from navapp.tracking.outline import OutlineMeter
 from navapp.tracking.surface_meter import NEAR_BOX, WIDE_VIEW
@@ -22,13 +20,7 @@ def test_the_outline_moves_onto_the_edges_of_both_pictures() -> None:
     refiner = ContourRefiner(model, outline)
 
     def mean_square_px2(pose) -> float:
-        view = render_rectified(
-            model.rendered_mesh,
-            pose,
-            meter.geometry,
-            measured.box,
-            is_closed=is_closed(model.rendered_mesh),
-        )
+        view = model.render(pose, meter.geometry, measured.box)
         return float(np.mean(outline.block(begun.pair, pose, view, measured).residual ** 2))
 
     for shift_mm in ((0.4, 0.0, 0.0), (0.0, 0.4, 0.0), (-0.3, 0.3, 0.0)):
