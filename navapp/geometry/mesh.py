@@ -136,8 +136,8 @@ def join_meshes(*meshes: TriangleMesh) -> TriangleMesh:
 
 def drop_unused_vertices(mesh: TriangleMesh) -> TriangleMesh:
     """The same triangles without vertices that none of them has."""
-    used, faces = np.unique(mesh.faces, return_inverse=True)
-    faces = faces.reshape(mesh.faces.shape).astype(np.int32)
+    used, places = np.unique(mesh.faces, return_inverse=True)
+    faces = np.asarray(places.reshape(-1, 3), dtype=np.int32)
     return TriangleMesh(mesh.vertices_mm[used], faces, mesh.normals[used])
 
 

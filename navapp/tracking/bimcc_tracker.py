@@ -150,9 +150,7 @@ class BimccTracker(Tracker):
                 is_enough=lambda verdict: not _asks_for_more(verdict, state),
             )  # fmt: skip
             best = self.look_again(frame, best, goal, predicted, checks)
-            if is_misfit(best.verdict):
-                may_search_long = state.is_search_due and is_worth_a_search(best)
-                frame = replace(frame, may_search_long=may_search_long)
+            if is_misfit(best.verdict) and state.is_search_due and is_worth_a_search(best):
                 more = self.buried.find(frame)
                 best = self.judge_fits(frame, more, goal, predicted, best, checks, keeps_first=True)
         return best

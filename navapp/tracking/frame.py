@@ -45,7 +45,6 @@ class Frame:
     # when the rows of the pictures see a moving bone; None where they see it all at once.
     times: RowTimes | None = None
     n_searches: int = 0  # made since the bone was lost; odd ones go further off
-    may_search_long: bool = True  # a search that takes as long as many frames is worth it
     # told what is measured on all of the model near `start`, and at which pose.
     on_measured: OnMeasured = ignore
     # told the fraction done of a long search; what it raises stops the search.

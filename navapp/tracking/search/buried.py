@@ -78,12 +78,7 @@ class BuriedSearch:
         return PoseSampler(self._meter.model)
 
     def find(self, frame: Frame) -> Iterator[Fit | None]:
-        """From one frame to the next: where the start rests, then the best around it, if asked."""
-        fit = self._follower.follow(frame, frame.start, skips_samples=True)
-        if fit is not None:
-            yield fit
-        if not frame.may_search_long:
-            return
+        """From one frame to the next: the best around the start, if there is one."""
         random = np.random.default_rng(_SEED)
         twists = random.standard_normal((_N_FRAME_STARTS, 6)) * _ROUNDS[0].deviations
         centre_mm = frame.start.apply(self._meter.model.centre_mm)

@@ -35,19 +35,24 @@ class NearSearch:
         Matching on the model is exact but sees only what is close. Whoever is not content with that
         asks on: then the surface is measured freely as well.
         """
-        stayed = self._follower.follow(
-            frame, frame.start, LEAST_FRACTION, on_measured=frame.on_measured
-        )
-        if stayed is not None:
-            yield stayed
+        rested: list[Fit] = []
+        for fit in self.find_on_model(frame):
+            yield fit
+            rested.append(fit)
         found = self.find_freely(frame, NEAR_BOX)
-        if stayed is None or (found is not None and self._score(found) > self._score(stayed)):
+        if found is None:
+            if not rested:
+                yield None
+        elif all(self._score(found) > self._score(fit) for fit in rested):
             yield found
 
     def find_on_model(self, frame: Frame) -> Iterator[Fit]:
         """Fits on the model alone: from samples of it first, then from all of it at once."""
         for skips in (False, True):
-            fit = self._follower.follow(frame, frame.start, LEAST_FRACTION, skips_samples=skips)
+            fit = self._follower.follow(
+                frame, frame.start, LEAST_FRACTION,
+                skips_samples=skips, on_measured=frame.on_measured,
+            )  # fmt: skip
             if fit is not None:
                 yield fit
 

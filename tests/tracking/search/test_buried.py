@@ -39,10 +39,8 @@ def test_a_rough_pose_leads_to_the_bone() -> None:
 def test_it_looks_around_a_prediction_from_which_nothing_answers() -> None:
     a = room()
     frame = off(a, (1.6, -1.2, 1.4, 0.02, -0.02, 0.01))
-    *rested, best = a.tracker.buried.find(frame)
+    (best,) = a.tracker.buried.find(frame)
     assert error_mm(a, best) < 0.2
-    alone = list(a.tracker.buried.find(replace(frame, may_search_long=False)))
-    assert len(alone) == len(rested)
 
 
 class Asked:
