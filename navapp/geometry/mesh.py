@@ -118,10 +118,13 @@ class TriangleMesh:
             return TriangleMesh(np.empty((0, 3)), self.faces)
         component = self.component_of_faces()
         kept = self.faces[component == int(np.bincount(component).argmax())]
-        used = np.unique(kept)
-        new_index = np.full(len(self.vertices_mm), -1, dtype=np.int32)
-        new_index[used] = np.arange(len(used), dtype=np.int32)
-        return TriangleMesh(self.vertices_mm[used], new_index[kept])
+        return TriangleMesh(self.vertices_mm, kept).without_unused_vertices()
+
+    def without_unused_vertices(self) -> "TriangleMesh":
+        """The same triangles and normals, and only the vertices that they have."""
+        used, places = np.unique(self.faces, return_inverse=True)
+        faces = np.asarray(places.reshape(-1, 3), dtype=np.int32)
+        return TriangleMesh(self.vertices_mm[used], faces, self.normals[used])
 
 
 def join_meshes(*meshes: TriangleMesh) -> TriangleMesh:
@@ -132,13 +135,6 @@ def join_meshes(*meshes: TriangleMesh) -> TriangleMesh:
         np.concatenate([mesh.faces + first for mesh, first in zip(meshes, firsts, strict=False)]),
         np.concatenate([mesh.normals for mesh in meshes]),
     )
-
-
-def drop_unused_vertices(mesh: TriangleMesh) -> TriangleMesh:
-    """The same triangles without vertices that none of them has."""
-    used, places = np.unique(mesh.faces, return_inverse=True)
-    faces = np.asarray(places.reshape(-1, 3), dtype=np.int32)
-    return TriangleMesh(mesh.vertices_mm[used], faces, mesh.normals[used])
 
 
 def vertex_normals(vertices_mm: FloatArray, faces: IntArray) -> FloatArray:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from navapp.geometry.box import Box
-from navapp.geometry.mesh import TriangleMesh, drop_unused_vertices, join_meshes
+from navapp.geometry.mesh import TriangleMesh, join_meshes
 from navapp.geometry.mesh_edges import open_border
 from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.simplify import drawn, is_closed
@@ -58,7 +58,7 @@ class RegistrationModel:
     def rendered_mesh(self) -> TriangleMesh:
         """`seen_mesh` in fewer triangles where it has many, and its lid: what is rendered."""
         mesh, lid = drawn(self.seen_mesh), self.bone.lid
-        return mesh if lid is None else drop_unused_vertices(join_meshes(mesh, lid))
+        return mesh if lid is None else join_meshes(mesh, lid).without_unused_vertices()
 
     @cached_property
     def _n_outward(self) -> int:

@@ -8,8 +8,8 @@ from navapp.geometry.mesh import TriangleMesh, join_meshes
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from navapp.registration import RegistrationModel
 from navapp.resection.cut_bone import SURE_MM, UNSURE_MM, CutBone
-from navapp.resection.remaining_bone import Cut, remove_cuts
-from navapp.values import BoneModel, MeasuredFace, ResectionPlane
+from navapp.resection.remaining_bone import Cut, remove_cuts, remove_holes
+from navapp.values import BoneModel, DrillAxis, MeasuredFace, ResectionPlane
 from tests.registration.shapes import GEOMETRY
 from tests.resection.cuts import MADE, PLANNED, bone
 
@@ -66,6 +66,21 @@ def test_the_lid_closes_the_bone_and_is_not_seen() -> None:
     middle = round(GEOMETRY.centre_y_px), round(GEOMETRY.centre_x_px)
     assert whole.depth_mm[middle] == pytest.approx(450.0 - 10.5, abs=0.1)
     assert not seen.mask[middle]
+
+
+def test_the_inner_side_of_a_bone_is_not_seen_through_a_hole() -> None:
+    hole = DrillAxis("femur", np.array([0.0, 0.0, 30.0]), np.array([0.0, 0.0, -1.0]), 20.0, 12.0)
+    model = RegistrationModel(remove_holes(bone(), [hole], 1.0))
+    above = RigidTransform.from_parts(
+        "left_rect", "femur", rotation_from_vector((np.pi, 0.0, 0.0)), (0.0, 0.0, 450.0)
+    )
+    box = Box(0, 0, GEOMETRY.width, GEOMETRY.height)
+    seen = model.render(above, GEOMETRY, box)
+    middle = round(GEOMETRY.centre_y_px), round(GEOMETRY.centre_x_px)
+    assert not seen.mask[middle]
+    # All that is seen is the half of the ball that looks up.
+    assert np.nanmax(seen.depth_mm) < 450.0
+    assert seen.mask.sum() > 1000
 
 
 def test_a_measured_face_leaves_less_unsure() -> None:
