@@ -62,9 +62,10 @@ class RegistrationModel:
 
     @cached_property
     def _n_outward(self) -> int:
-        """Triangles rendered of which nobody sees the inner side: those of a whole bone, not cut.
+        """How many of the triangles rendered, the first, are never drawn from inside.
 
-        What cuts leave open is behind the lid.
+        All but the lid's, where the bone was closed before anything was removed: then its inner
+        side is not seen through a hole either.
         """
         n_lid = 0 if self.bone.lid is None else len(self.bone.lid.faces)
         is_whole = is_closed(self.bone.mesh if n_lid > 0 else self.rendered_mesh)

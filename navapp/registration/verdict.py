@@ -150,7 +150,7 @@ def _without_pose(reason: Reason, quantity: str) -> Rule:
 
 
 _PARTLY_CHOSEN = "tests.bench.wrong_plans; LOST chosen"
-_TRAINED = "tests.bench.judge_limits; LOST chosen"
+_JUDGE_LIMITS = "tests.bench.judge_limits; LOST chosen"
 _HEALTH = "tests.bench.stereo_health"
 _RESIDUALS = "chosen; noise by tests.bench.correlated_residuals"
 
@@ -183,7 +183,7 @@ RULES = (
     Rule(Reason.SURFACE_MISFIT, "correlated residuals' variance over the noise of right poses",
          lambda e: e.correlated_ratio, 2.0, None, _RESIDUALS, doubts_place=True),
     Rule(Reason.COVERAGE_LOW, "what nothing hides: measured and agreeing",
-         lambda e: e.seen.open_coverage, 0.2, 0.15, _TRAINED, is_below=True,
+         lambda e: e.seen.open_coverage, 0.2, 0.15, _JUDGE_LIMITS, is_below=True,
          doubts_place=True),
     Rule(Reason.COVERAGE_LOW, "the whole visible model: measured and agreeing",
          lambda e: e.seen.coverage, 0.15, 0.1, CHOSEN, is_below=True, doubts_place=True),
@@ -221,7 +221,7 @@ RULES = (
 )  # fmt: skip
 
 _AGAINST_PLACE = frozenset(rule.reason for rule in RULES if rule.doubts_place)
-# Of these, what a better view mends, and no better place.
+# Of these, what a better view mends, and no better place, where something hides the bone.
 _LITTLE_SEEN = frozenset({Reason.COVERAGE_LOW, Reason.DEGENERATE})
 _OF_AGREEMENT = tuple(
     rule
@@ -281,5 +281,9 @@ def is_place_doubted(verdict: Verdict) -> bool:
 
 
 def is_misfit(verdict: Verdict) -> bool:
-    """Whether what is seen fits badly at a pose's place; that little is seen is no misfit."""
-    return not (_AGAINST_PLACE - _LITTLE_SEEN).isdisjoint(verdict.reasons)
+    """Whether another place may explain better what is seen than a pose's does.
+
+    That little of a bone is seen which something hides is no misfit.
+    """
+    against = _AGAINST_PLACE if is_little_occluded(verdict) else _AGAINST_PLACE - _LITTLE_SEEN
+    return not against.isdisjoint(verdict.reasons)

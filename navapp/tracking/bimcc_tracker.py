@@ -98,7 +98,7 @@ class BimccTracker(Tracker):
             best = self._follow_closer(left, right, frame, best, state, goal)
         else:
             best = self.look_near(frame, goal)
-        if best.verdict.status is Status.LOST and state.is_search_after_loss_due:
+        if _is_searched_after_loss(best.verdict, state):
             state = replace(state, box=self.boxes.follow(state.box, left))
             # Search where the box lies, and where the bone was expected.
             best = self.search_places(
@@ -213,10 +213,17 @@ class BimccTracker(Tracker):
         return FirstRegistration(self).register(left, right, prior, goal, on_progress)
 
 
-def _asks_for_more(verdict: Verdict, state: TrackState) -> bool:
-    """Whether another place may fit better than one does.
+def _is_searched_after_loss(verdict: Verdict, state: TrackState) -> bool:
+    """Whether the bone is searched where it was not expected: in lost frames now and then.
 
-    Where only little of the bone is seen, that is asked as rarely as a long search is made.
+    What is found after a loss and doubted ends the loss only if a search finds nothing better.
     """
-    is_bad = verdict.status is Status.LOST or is_misfit(verdict)
-    return is_bad or (is_place_doubted(verdict) and state.is_search_due)
+    if verdict.status is Status.LOST:
+        return state.is_search_after_loss_due
+    return state.n_lost > 0 and is_place_doubted(verdict)
+
+
+def _asks_for_more(verdict: Verdict, state: TrackState) -> bool:
+    """Whether it is asked how the bone would fit elsewhere: while in doubt ever more rarely."""
+    is_lost = verdict.status is Status.LOST
+    return is_lost or (is_place_doubted(verdict) and state.is_search_due)

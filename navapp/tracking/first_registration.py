@@ -170,7 +170,7 @@ class FirstRegistration:
     def _fit_pose(self, frame: Frame) -> Fit | None:
         """What explains more: the model matched where it is expected, or what lies around it."""
         near = self._tracker.near
-        fits = (*near.find(frame), near.find_freely(frame, WIDE_BOX))
+        fits = (*near.find_on_model(frame), near.find_freely(frame, WIDE_BOX))
         found = (fit for fit in fits if fit is not None)
         return max(found, key=self._scorer.score, default=None)
 

@@ -17,7 +17,7 @@ from navapp.registration.verdict import (
     Goal,
     decide,
 )
-from navapp.stereo import StereoHealth
+from navapp.stereo import StereoHealth, measure_health
 from navapp.tracking.agreement import compare
 from navapp.tracking.checks import PairCheck, PairChecks
 from navapp.tracking.foreground import find_foreground
@@ -155,6 +155,14 @@ class PoseJudge:
         """The answer when there is no fit to judge."""
         verdict = decide(Evidence(missing=reason, is_rig_accepted=self._is_rig_accepted))
         return TrackedFrame(self._meter.model.bone.name, None, verdict, watch.timings)
+
+    def lost_in(self, frame: Frame) -> TrackedFrame:
+        """The answer when nothing fits near the start of a frame, with what its pictures say."""
+        depth_mm = float(frame.start.apply(self._meter.model.centre_mm)[2])
+        disparity_px = self._meter.geometry.disparity_px(depth_mm)
+        known = self._evidence_of_pair(measure_health(frame.pair, None, disparity_px), depth_mm)
+        verdict = decide(replace(known, missing=Reason.BONE_LOST))
+        return TrackedFrame(self._meter.model.bone.name, None, verdict, frame.watch.timings)
 
     def _evidence_of_pair(self, health: StereoHealth, depth_mm: float) -> Evidence:
         """What the pictures themselves say against any pose at a depth."""

@@ -50,7 +50,7 @@ class TrackState:
 
     @property
     def is_search_due(self) -> bool:
-        """Whether the next frame, if in doubt as well, is worth a long search: ever more rarely."""
+        """Whether the next frame, if in doubt too, is searched elsewhere: ever more rarely."""
         return _is_due(self.n_doubted, _MOST_BETWEEN_SEARCHES)
 
     @property
@@ -60,7 +60,7 @@ class TrackState:
 
     @property
     def n_searches(self) -> int:
-        """Searches after the loss that were due in the frames since."""
+        """How many searches have been due since the loss."""
         return sum(_is_due(n, _MOST_BETWEEN_SEARCHES_LOST) for n in range(self.n_lost))
 
     def predict(self, captured_ns: int, centre_mm: FloatArray) -> RigidTransform:

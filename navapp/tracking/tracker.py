@@ -252,7 +252,7 @@ class Tracker(ABC):
                 best = answer
             if is_enough(answer.verdict):
                 break
-        return best or self.judge.lost(Reason.BONE_LOST, frame.watch)
+        return best or self.judge.lost_in(frame)
 
     def search_places(
         self,

@@ -31,7 +31,7 @@ class TrackerParts(BimccTracker):
         return Frame(self.meter.rectify(left, right, start, margins), start, Stopwatch())
 
     def find(self, frame: Frame) -> Fit | None:
-        """Where the model rests near the start; None out of view."""
+        """The first fit near the start: where the model rests, if it does. None out of view."""
         return next(self.near.find(frame))
 
     def verdict(self, frame: Frame, fit: Fit) -> Verdict:

@@ -286,8 +286,10 @@ def test_some_reasons_speak_against_the_place(reason: Reason) -> None:
     doubted = Verdict(Status.DEGRADED, 0.5, (reason,))
     assert is_place_doubted(doubted) is (reason in speaks)
     assert is_place_doubted(Verdict(Status.LOST, None, (reason,)))
-    # No better place mends that little of the bone is seen.
-    assert is_misfit(doubted) is (reason in speaks - {Reason.COVERAGE_LOW, Reason.DEGENERATE})
+    assert is_misfit(replace(doubted, occluded_fraction=0.1)) is (reason in speaks)
+    # No better place mends that little is seen of a bone that something hides.
+    hidden = replace(doubted, occluded_fraction=0.3)
+    assert is_misfit(hidden) is (reason in speaks - {Reason.COVERAGE_LOW, Reason.DEGENERATE})
 
 
 def test_the_cause_comes_first_and_once_and_an_ok_has_none() -> None:

@@ -215,6 +215,27 @@ def test_a_lost_bone_is_looked_for_in_every_frame_and_searched_in_some(
     assert after.n_lost == 0
 
 
+def test_a_doubted_place_ends_no_loss_before_the_bone_was_searched_elsewhere() -> None:
+    a, asked = room(), []
+    tracker = BimccTracker(a.rig, a.tracker.model.bone, judge=Doubting(a.tracker.meter))
+    tracker.after_loss = SimpleNamespace(find=lambda frame: asked.append(frame) or [])
+    picture = a.frames[2]
+    state = replace(TrackState.at_rest(a.truth(picture), 0), n_lost=3)
+    given = picture.left, picture.right, picture.captured_ns
+    assert tracker.track(*given, state, GOAL)[0].verdict.reasons == (Reason.SURFACE_MISFIT,)
+    assert len(asked) == 1
+
+
+@pytest.mark.parametrize("n_lost", [3, 4, 5])
+def test_in_every_lost_frame_a_dark_picture_is_the_first_reason(n_lost: int) -> None:
+    a, picture = room(), room().frames[2]
+    state = replace(TrackState.at_rest(a.truth(picture), 0), n_lost=n_lost)
+    black = np.zeros_like(picture.left)
+    tracked, _ = a.tracker.track(black, black, picture.captured_ns, state, GOAL)
+    assert tracked.verdict.status is Status.LOST
+    assert tracked.verdict.reasons[0] is Reason.PICTURE_DARK
+
+
 @pytest.mark.parametrize("n_lost", [0, 5])
 def test_a_glance_finds_a_bone_near_where_it_is_expected(n_lost: int) -> None:
     a = room()

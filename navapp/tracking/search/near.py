@@ -11,7 +11,7 @@ from navapp.tracking.surface_meter import NEAR_BOX, Margins, Measurement, Surfac
 _NEARBY_SETTINGS = FREE_SETTINGS._replace(widest_mm=3.0)
 
 
-# Chosen. When less of the model's samples is matched, the bone is elsewhere.
+# Chosen. When less of the model's samples is matched, they are not followed.
 LEAST_FRACTION = 0.3
 # Chosen. When so much of the model is matched after a free search, no second one is made nearby.
 SURE_FRACTION = 0.45
@@ -30,10 +30,10 @@ class NearSearch:
         self._follower = Follower(meter)
 
     def find(self, frame: Frame) -> Iterator[Fit | None]:
-        """Where the model rests on the pictures; then, if asked, what explains more. None: no view.
+        """Where the model rests on the pictures: at most two fits; then what explains more, if any.
 
         Matching on the model is exact but sees only what is close. Whoever is not content with that
-        asks on: then the surface is measured freely as well.
+        asks on: then the surface is measured freely as well. None is a bone out of view.
         """
         rested: list[Fit] = []
         for fit in self.find_on_model(frame):
