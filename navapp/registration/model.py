@@ -64,12 +64,11 @@ class RegistrationModel:
     def _n_outward(self) -> int:
         """How many of the triangles rendered, the first, are never drawn from inside.
 
-        All but the lid's, where the bone was closed before anything was removed: then its inner
-        side is not seen through a hole either.
+        All but the lid's, where the bone is closed but for what was removed: then its inner side is
+        not seen through a hole either.
         """
         n_lid = 0 if self.bone.lid is None else len(self.bone.lid.faces)
-        is_whole = is_closed(self.bone.mesh if n_lid > 0 else self.rendered_mesh)
-        return len(self.rendered_mesh.faces) - n_lid if is_whole else 0
+        return len(self.rendered_mesh.faces) - n_lid if is_closed(self.bone.mesh) else 0
 
     def render(
         self,

@@ -99,11 +99,12 @@ class BimccTracker(Tracker):
         else:
             best = self.look_near(frame, goal)
         if _is_searched_after_loss(best.verdict, state):
-            state = replace(state, box=self.boxes.follow(state.box, left))
+            n_searches, box = state.n_searches, self.boxes.follow(state.box, left)
+            state = replace(state, box=box, n_searches=n_searches + 1)
             # Search where the box lies, and where the bone was expected.
             best = self.search_places(
                 left, right, self.boxes.starts(left_from_bone, state.box), self.after_loss.find,
-                goal, frame.start, best, watch, state.n_searches, times,
+                goal, frame.start, best, watch, n_searches, times,
             )  # fmt: skip
         if best.verdict.status is not Status.OK:
             best = best.with_cause(self.find_cause(left, right, left_from_bone, state, best))

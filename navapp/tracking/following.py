@@ -15,10 +15,9 @@ class RestSettings:
     """When a pose rests on the model; all chosen, reach in `tests.bench.follower_reach`."""
 
     max_sampled: int = 3  # rounds on samples of the model, at most
-    near_mm: float = 0.4  # a move of less ends the sampling
+    near_mm: float = 0.2  # a move of less ends the sampling
     max_rounds: int = 6  # rounds of matching and fitting, at most
     rest_mm: float = 0.05  # after a move of less, the bone rests
-    settled_mm: float = 0.2  # a last move of more says that it did not come to rest
 
 
 class Follower:
@@ -90,7 +89,7 @@ class Follower:
             elif is_near:
                 break
             is_near |= moved_mm < settings.near_mm or n_rounds >= settings.max_sampled
-        if fit is None or moved_mm < settings.settled_mm:
+        if fit is None or moved_mm < settings.near_mm:
             return fit
         # The last step still moved the bone.
         return fit.with_reason(Reason.NOT_CONVERGED)

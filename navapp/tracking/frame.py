@@ -44,7 +44,7 @@ class Frame:
     rectify_coloured: RectifyBox | None = None
     # when the rows of the pictures see a moving bone; None where they see it all at once.
     times: RowTimes | None = None
-    n_searches: int = 0  # due since the bone was lost; odd ones go further off
+    n_searches: int = 0  # made since the bone was lost; the next one goes further off if odd
     # told what is measured on all of the model near `start`, and at which pose.
     on_measured: OnMeasured = ignore
     # told the fraction done of a long search; what it raises stops the search.

@@ -20,6 +20,7 @@ from navapp.registration.verdict import (
 from navapp.stereo import StereoHealth, measure_health
 from navapp.tracking.agreement import compare
 from navapp.tracking.checks import PairCheck, PairChecks
+from navapp.tracking.following import RestSettings
 from navapp.tracking.foreground import find_foreground
 from navapp.tracking.frame import NOISE_VARIANCE_RATIO, Fit, Frame
 from navapp.tracking.outline import NoOutline, OutlineMeter
@@ -41,8 +42,8 @@ from navapp.values import (
 # (docs/measurements.md).
 _COMMON_ERROR_SIGMAS = 2.0
 _SURE_SIGMAS = 3.0
-# A model that the outline moved by no more looks as it was matched; chosen.
-_SAME_VIEW_MM = 0.2
+# A model that the outline moved by no more looks as it was matched; a follower allows as much.
+_SAME_VIEW_MM = RestSettings().near_mm
 # About so many targets are used for the predicted error; for time alone.
 _MOST_TARGETS = 200
 

@@ -29,6 +29,7 @@ class TrackState:
     # (6,) twist per second (mm/s, rad/s), left, about the model's centre; None: not known.
     velocity: FloatArray | None
     n_lost: int = 0  # frames lost since then
+    n_searches: int = 0  # searches made in these frames
     # consecutive frames in doubt; a lost frame leaves the count alone, a glance or a frame in which
     # a search could gain nothing sets it to 0
     n_doubted: int = 0
@@ -57,11 +58,6 @@ class TrackState:
     def is_search_after_loss_due(self) -> bool:
         """Whether the next frame, if lost as well, is searched where the bone was not expected."""
         return _is_due(self.n_lost, _MOST_BETWEEN_SEARCHES_LOST)
-
-    @property
-    def n_searches(self) -> int:
-        """How many searches have been due since the loss."""
-        return sum(_is_due(n, _MOST_BETWEEN_SEARCHES_LOST) for n in range(self.n_lost))
 
     def predict(self, captured_ns: int, centre_mm: FloatArray) -> RigidTransform:
         """The pose expected at a moment; where it was last seen after a long gap."""

@@ -59,7 +59,7 @@ def test_a_camera_turned_up_by_two_hundredths_of_a_degree_ends_the_trust(undo: E
     )
     until_s(room, 12.0)
     assert room.state == "fault"
-    assert room.clock.now_ns() < 9.0 * S
+    assert room.clock.now_ns() < 8.5 * S
     assert not room.display.visible_image().any()
     alarm = room.controller.snapshot.rig_alarm
     assert alarm.startswith("rig moved, recalibrate (the right picture shows everything 0.")

@@ -196,23 +196,24 @@ def test_a_frame_that_is_tracked_asks_for_all_that_a_glance_does_not() -> None:
 
 
 @pytest.mark.parametrize(
-    ("n_lost", "searches"), [(1, [1, 0]), (2, [2, 0]), (3, []), (4, [3, 0]), (5, [])]
+    ("n_lost", "searches"), [(1, [3, 0]), (2, [3, 0]), (3, []), (4, [3, 0]), (5, [])]
 )
 def test_a_lost_bone_is_looked_for_in_every_frame_and_searched_in_some(
     n_lost: int, searches: list[int]
 ) -> None:
     a, asked = room(), []
-    state, picture = replace(lost_far_away(a), n_lost=n_lost), a.frames[2]
+    state, picture = replace(lost_far_away(a), n_lost=n_lost, n_searches=3), a.frames[2]
     tracker = BimccTracker(a.rig, a.tracker.model.bone)
     tracker.after_loss = SimpleNamespace(find=lambda frame: asked.append(frame.n_searches) or [])
     given = picture.left, picture.right, picture.captured_ns
-    tracker.track(*given, state, GOAL)
+    _, after = tracker.track(*given, state, GOAL)
     # Where its box lies, which may go further off, and where it was expected.
     assert asked == searches
+    assert after.n_searches == (4 if searches else 3)
     near = replace(state, left_from_bone=a.truth(picture))
     found, after = tracker.track(*given, near, GOAL)
     assert found.verdict.status is Status.OK
-    assert after.n_lost == 0
+    assert after.n_lost == after.n_searches == 0
 
 
 def test_a_doubted_place_ends_no_loss_before_the_bone_was_searched_elsewhere() -> None:

@@ -51,7 +51,7 @@ def make_starts_after_loss(
     Args:
         last: pose of the bone when it was seen last.
         centre_mm: (3,) of the model, in bone coordinates.
-        n_searches: due since the bone was lost, before this one.
+        n_searches: made since the bone was lost, before this one.
     """
     if n_searches % 2 == 0:
         return []

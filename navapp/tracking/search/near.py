@@ -13,7 +13,7 @@ _NEARBY_SETTINGS = FREE_SETTINGS._replace(widest_mm=3.0)
 
 # Chosen. When less of the model's samples is matched, they are not followed.
 LEAST_FRACTION = 0.3
-# Chosen. When so much of the model is matched after a free search, no second one is made nearby.
+# Chosen. When so much of the model is matched, the bone is where it was looked for.
 SURE_FRACTION = 0.45
 
 
@@ -30,31 +30,37 @@ class NearSearch:
         self._follower = Follower(meter)
 
     def find(self, frame: Frame) -> Iterator[Fit | None]:
-        """Where the model rests on the pictures: at most two fits; then what explains more, if any.
+        """Where the model rests, then what explains more of it: a caller takes as many as it needs.
 
-        Matching on the model is exact but sees only what is close. Whoever is not content with that
-        asks on: then the surface is measured freely as well. None is a bone out of view.
+        Matching on the model is exact but sees only what is close. Unless samples of it led to
+        where much of it is matched, the surface is measured freely as well. None: out of view.
         """
-        rested: list[Fit] = []
-        for fit in self.find_on_model(frame):
-            yield fit
-            rested.append(fit)
+        sampled = self._rest_from_samples(frame)
+        if sampled is not None:
+            yield sampled
+        whole = self._rest_at_once(frame)
+        if whole is not None:
+            yield whole
+        if sampled is not None and sampled.measured.matched_fraction >= SURE_FRACTION:
+            return
         found = self.find_freely(frame, NEAR_BOX)
-        if found is None:
-            if not rested:
-                yield None
-        elif all(self._score(found) > self._score(fit) for fit in rested):
+        scores = [self._score(fit) for fit in (sampled, whole) if fit is not None]
+        if not scores or (found is not None and self._score(found) > max(scores)):
             yield found
 
     def find_on_model(self, frame: Frame) -> Iterator[Fit]:
         """Fits on the model alone: from samples of it first, then from all of it at once."""
-        for skips in (False, True):
-            fit = self._follower.follow(
-                frame, frame.start, LEAST_FRACTION,
-                skips_samples=skips, on_measured=frame.on_measured,
-            )  # fmt: skip
-            if fit is not None:
+        for rest in (self._rest_from_samples, self._rest_at_once):
+            if (fit := rest(frame)) is not None:
                 yield fit
+
+    def _rest_from_samples(self, frame: Frame) -> Fit | None:
+        told = frame.on_measured
+        return self._follower.follow(frame, frame.start, LEAST_FRACTION, on_measured=told)
+
+    def _rest_at_once(self, frame: Frame) -> Fit | None:
+        told = frame.on_measured
+        return self._follower.follow(frame, frame.start, skips_samples=True, on_measured=told)
 
     def find_freely(self, frame: Frame, margins: Margins) -> Fit | None:
         """Measure freely around the start, fit, then follow onto the model; None out of view."""
