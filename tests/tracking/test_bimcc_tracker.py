@@ -267,6 +267,30 @@ def test_a_doubt_at_a_glance_puts_off_no_search() -> None:
     assert not state.update(found, 0, tracker.centre_mm).is_search_due
 
 
+@pytest.mark.parametrize(("n_doubted", "is_due"), [(0, True), (2, True), (3, False), (5, False)])
+def test_a_doubted_place_is_compared_with_others_ever_more_rarely(
+    n_doubted: int, is_due: bool
+) -> None:
+    a, taken = room(), []
+    tracker = BimccTracker(
+        a.rig, a.tracker.model.bone, judge=Doubting(a.tracker.meter),
+        highlights=SimpleNamespace(find=lambda *given: []),
+        buried=SimpleNamespace(find=lambda frame: taken.append("buried") or []),
+    )  # fmt: skip
+    near = tracker.near.find
+
+    def find(frame):
+        for fit in near(frame):
+            taken.append("near")
+            yield fit
+
+    tracker.near.find = find
+    picture = a.frames[2]
+    state = replace(TrackState.at_rest(a.truth(picture), 0), n_doubted=n_doubted)
+    tracker.track(picture.left, picture.right, picture.captured_ns, state, GOAL)
+    assert taken == (["near", "near", "buried"] if is_due else ["near"])
+
+
 def test_the_box_of_a_pose_is_its_projection() -> None:
     a = room()
     frame = a.frames[0]

@@ -9,7 +9,7 @@ import pytest
 from navapp.geometry.transform import RigidTransform
 from navapp.tracking.frame import Fit, Frame
 from navapp.tracking.scoring import FitScorer
-from navapp.tracking.search.near import LEAST_FRACTION, NearSearch
+from navapp.tracking.search.near import LEAST_FRACTION, SURE_FRACTION, NearSearch
 from navapp.tracking.surface_meter import NEAR_BOX, WIDE_BOX, Margins
 from navapp.values import Reason, Stopwatch
 from tests.registration.shapes import TRUE
@@ -101,6 +101,16 @@ def test_what_is_found_freely_is_told_where_it_explains_more(is_search_better: b
     assert "freely" not in meter.asked
     assert len(list(answers)) == is_search_better
     assert meter.asked.count("freely") == 1
+
+
+def test_where_samples_led_to_much_of_the_model_nothing_is_measured_freely() -> None:
+    meter = FakeMeter()
+    meter.share = SURE_FRACTION + 0.01
+    assert len(list(search_of(meter).find(frame_at(TRUE)))) == 2
+    assert "freely" not in meter.asked
+    meter.share = SURE_FRACTION - 0.01
+    list(search_of(meter).find(frame_at(TRUE)))
+    assert "freely" in meter.asked
 
 
 def test_samples_of_which_too_few_are_matched_are_not_followed() -> None:
