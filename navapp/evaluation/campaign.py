@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar
@@ -191,9 +191,11 @@ def run_campaign(
 
 def run_test(folder: CampaignFolder[T], settings: Campaign[T], test: T, *, is_timed: bool) -> None:
     """Render a test and follow it with every method; the file appears when all is done."""
+    sequence = settings.render(test, settings.count_frames(test))
     if is_timed:
         _warm_up(settings)
-    sequence = settings.render(test, settings.count_frames(test))
+        # Its errors are those of the other pass: without truth none is measured again.
+        sequence = replace(sequence, truth=[None] * len(sequence.truth))
     answers = {method: settings.follow(sequence, method) for method in settings.methods}
     if not is_timed and "bimcc" in answers:
         picture = draw_worst_frame(sequence, answers["bimcc"])

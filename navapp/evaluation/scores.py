@@ -46,6 +46,14 @@ class FrameScore:
         """The judge believes it."""
         return self.status == "OK"
 
+    @property
+    def was_followed(self) -> bool:
+        """The bone was carried on from the frame before and judged; whether or not truth is known.
+
+        Frames of a search and those after which nothing was followed are none.
+        """
+        return self.seen is not None and not self.is_search
+
     def to_json(self) -> dict[str, Any]:
         """Named values."""
         return asdict(self)

@@ -1,8 +1,8 @@
 """Campaigns: what is kept, what is run again, what is refused."""
 
 import json
-from collections.abc import Iterator
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import pytest
@@ -20,23 +20,33 @@ SETTINGS = TableSettings(ALL_CASES[:2], ("paper", "bimcc"), 2, 3, 1)
 NAMES = [test.name for test in SETTINGS.tests]
 
 
+@dataclass(frozen=True)
+class Pictures:
+    """Stands for a rendered sequence."""
+
+    test: CaseTest
+    truth: Sequence[object | None]
+
+
 class Line:
     """Stands for renderer and methods: answers that a test's seed tells, and how long they took."""
 
     def __init__(self) -> None:
         self.done: list[tuple[int, str]] = []  # seed and method
+        self.is_scored: list[bool] = []  # of each of them: its truth was there
         self.is_killed_at: int | None = None  # so many methods were followed
         self.total_ms = 10.0
         self.has_picture = True
 
     def render(self, test, n_frames: int):
         assert n_frames in (4, 3), "one frame more than are counted, or those of a warm-up"
-        return SimpleNamespace(test=test)
+        return Pictures(test, [object()] * n_frames)
 
     def follow(self, sequence, method):
         if self.is_killed_at == len(self.done):
             raise KeyboardInterrupt
         self.done.append((sequence.test.seed, method))
+        self.is_scored.append(all(sequence.truth))
         self.total_ms += 1.0
         value = 1e-3 * sequence.test.seed + (0.5 if method == "paper" else 0.0)
         frames = [score(value, index=n, total_ms=self.total_ms) for n in (1, 2, 3)]
@@ -107,6 +117,12 @@ def test_times_are_taken_when_everything_is_loaded(line, tmp_path) -> None:
     # Four tests, a warm-up of the process that takes times, and two tests in it.
     seeds = [seed for seed, method in line.done if method == "bimcc"]
     assert seeds == [1, 2, 101, 102, 1, 1, 101]
+
+
+def test_errors_are_measured_in_the_tests_alone_not_where_times_are_taken(line, tmp_path) -> None:
+    run(tmp_path / "a")
+    assert line.is_scored[:8] == [True] * 8, "four tests, two methods"
+    assert line.is_scored[-4:] == [False] * 4, "two tests"
 
 
 @pytest.mark.parametrize("n_followed", [0, 1, 3, 8, 11, 12, 13])

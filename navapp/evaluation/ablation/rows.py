@@ -112,12 +112,7 @@ def _make_row(
 
 def _list_times_ms(tests: Sequence[Followed]) -> list[float]:
     """Of frames in which a bone was followed."""
-    return [
-        frame.total_ms
-        for test in tests
-        for frame in test.frames
-        if not frame.is_search and (frame.tre_mm is not None or frame.reasons)
-    ]
+    return [frame.total_ms for test in tests for frame in test.frames if frame.was_followed]
 
 
 def _is_same(one: FrameScore, other: FrameScore) -> bool:

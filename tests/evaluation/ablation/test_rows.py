@@ -84,7 +84,7 @@ def test_times_are_of_frames_in_which_a_bone_was_followed_in_their_own_pass() ->
         followed(
             score(0.1, total_ms=10.0), score(0.1, total_ms=20.0), score(0.1, total_ms=60.0),
             score(0.1, total_ms=5000.0, is_search=True),
-            score(None, "LOST", reasons=(), total_ms=1.0),
+            score(None, "LOST", reasons=(), seen=None, total_ms=1.0),
             registration_s=0.5,
         ),
     )  # fmt: skip

@@ -94,7 +94,7 @@ def test_one_knee_has_no_interval_and_one_without_a_frame_is_drawn_too() -> None
 
 
 def test_nothing_found_is_no_figure() -> None:
-    lost = followed(score(None, "LOST", reasons=()), registration_s=None)
+    lost = followed(score(None, "LOST", reasons=(), seen=None), registration_s=None)
     row = make_row(CASE, "bimcc", done(lost), done(lost))
     assert (row.tre_mm, row.overlay_mm, row.tre_ci95, row.coverage) == (None, None, None, None)
     assert (row.fps, row.p50_ms, row.registration_s, row.ok_share) == (None, None, None, 0.0)
@@ -105,9 +105,9 @@ def test_nothing_found_is_no_figure() -> None:
 def test_times_are_those_of_the_timed_tests_without_searches() -> None:
     timed = followed(
         score(0.1, total_ms=10.0),
-        score(0.1, total_ms=30.0),
+        score(None, total_ms=30.0),  # a pose whose truth was not asked for
         score(0.1, total_ms=999.0, is_search=True),
-        score(None, "LOST", reasons=(), total_ms=1.0),  # nothing was looked for
+        score(None, "LOST", reasons=(), seen=None, total_ms=1.0),  # nothing was looked for
         score(None, "LOST", total_ms=80.0),  # looked for in vain: that took its time
         registration_s=0.5,
     )

@@ -80,7 +80,7 @@ def test_a_stage_and_situation_pools_the_samples_by_their_ok_frames() -> None:
 
 
 def test_what_was_not_run_or_not_found_is_a_dash() -> None:
-    lost = done(followed(score(None, "LOST", reasons=()), registration_s=None))
+    lost = done(followed(score(None, "LOST", reasons=(), seen=None), registration_s=None))
     (row,) = tables_in(tables_of(lost))[0][2:]
     assert row[3] == row[5] == "-, -, 100 %"
     assert row[6:] == ["**-**", "-", "0 %", "-", "-"]

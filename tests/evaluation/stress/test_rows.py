@@ -43,7 +43,7 @@ def test_wrong_frames_count_where_pictures_can_show_them() -> None:
 def test_a_level_without_a_pose_has_no_figures() -> None:
     (row,) = make_axis_rows(AXES["light"], stressed("light", {1.0: [[LOST]]})).rows
     assert (row.tre_mm, row.worst_mm, row.tre_any_mm, row.coverage) == (None,) * 4
-    no_reason = score(None, "LOST", reasons=())
+    no_reason = score(None, "LOST", reasons=(), seen=None)
     (row,) = make_axis_rows(AXES["light"], stressed("light", {1.0: [[no_reason]]})).rows
     assert row.reason == "no pose"
 
