@@ -48,9 +48,9 @@ class FrameScore:
 
     @property
     def was_followed(self) -> bool:
-        """The bone was carried on from the frame before and judged; whether or not truth is known.
+        """A registered bone was followed or looked for again in it, and judged; needs no truth.
 
-        Frames of a search and those after which nothing was followed are none.
+        False in the frame of a registration, and as long as none has found the bone.
         """
         return self.seen is not None and not self.is_search
 
@@ -106,3 +106,8 @@ class Followed:
             content["n_registrations"],
             tuple(FrameScore.from_json(one) for one in content["frames"]),
         )
+
+    @property
+    def times_ms(self) -> list[float]:
+        """Of the frames in which a bone was followed; those of a search are none."""
+        return [frame.total_ms for frame in self.frames if frame.was_followed]

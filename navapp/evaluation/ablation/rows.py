@@ -12,7 +12,7 @@ from navapp.evaluation.ablation.settings import VARIANTS, WHOLE
 from navapp.evaluation.campaign import Done
 from navapp.evaluation.paper.cases import SITUATIONS, STAGE_NAMES, CaseTest, SituationName
 from navapp.evaluation.paper.rows import is_within_bound, is_wrong
-from navapp.evaluation.scores import Followed, FrameScore
+from navapp.evaluation.scores import FrameScore
 
 ALL: Final = "all"
 SituationOrAll = SituationName | Literal["all"]
@@ -89,7 +89,7 @@ def _make_row(
     frames = [frame for one in done for frame in one.followed[variant].frames]
     whole = [frame for one in done for frame in one.followed[WHOLE].frames]
     ok = [frame for frame in frames if frame.is_ok and frame.tre_mm is not None]
-    times_ms = _list_times_ms([one.followed[variant] for one in timed])
+    times_ms = [ms for one in timed for ms in one.followed[variant].times_ms]
     return VariantRow(
         stage=stage,
         situation=situation,
@@ -108,11 +108,6 @@ def _make_row(
         mean_ms=_mean(times_ms),
         registration_s=_mean([one.followed[variant].registration_s for one in timed]),
     )
-
-
-def _list_times_ms(tests: Sequence[Followed]) -> list[float]:
-    """Of frames in which a bone was followed."""
-    return [frame.total_ms for test in tests for frame in test.frames if frame.was_followed]
 
 
 def _is_same(one: FrameScore, other: FrameScore) -> bool:

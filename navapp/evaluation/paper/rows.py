@@ -155,7 +155,7 @@ def _time(
     tests: Sequence[Followed],
 ) -> tuple[list[float] | None, float | None, float | None]:
     """Times of frames in which a bone was followed, frames a second, seconds of a registration."""
-    times_ms = [frame.total_ms for test in tests for frame in test.frames if frame.was_followed]
+    times_ms = [ms for test in tests for ms in test.times_ms]
     registrations = [test.registration_s for test in tests if test.registration_s is not None]
     mean_s = float(np.mean(registrations)) if registrations else None
     if not times_ms:
