@@ -6,6 +6,7 @@ import os
 import threading
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TextIO
 
 import psutil
 import pytest
@@ -109,6 +110,8 @@ def pytest_collection_finish() -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    # The pictures of cases that run before a release only are there without being asked for.
+    config.option.warn_unused_snapshots = not config.getoption("--release")
     if config.getoption("--every-kernel"):
         from tests.kernels_run import EveryKernel
 
@@ -131,6 +134,16 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         metavar="FILE",
         help="also run the contracts on the devices of this configuration",
     )
+
+
+@pytest.fixture
+def empty_plots(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Plots are made and not drawn, which takes half a second each: their pictures are empty."""
+
+    def write(_figure: object, file: TextIO, **_options: object) -> None:
+        file.write("<svg></svg>")
+
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", write)
 
 
 @pytest.fixture

@@ -37,6 +37,7 @@ def test_a_kept_knee_is_the_simulators(tmp_path, monkeypatch, is_there: bool) ->
             np.testing.assert_array_equal(found[name], wanted[name])
 
 
+@pytest.mark.release
 def test_kept_tissue_components_and_drawn_meshes_are_what_is_made(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(kept, "FOLDER", tmp_path)
     knee = kept.make_knee(SPEC)

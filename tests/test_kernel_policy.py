@@ -34,6 +34,8 @@ def is_listener_import(node: ast.AST) -> bool:
 
 def faults_of(source: str, file_name: str) -> list[str]:
     """What a file does that kernels must not do."""
+    if "numba" not in source:
+        return []
     tree = ast.parse(source)
     faults = []
     kernels = kernels_of(tree)
@@ -76,7 +78,8 @@ def test_kernels_are_cached_let_others_run_and_stay_exact() -> None:
 
 
 def test_there_are_kernels_to_check() -> None:
-    found = sum(len(kernels_of(ast.parse(path.read_text(encoding="utf-8")))) for path in SOURCES)
+    kernel_files = [path for path in SOURCES if path.name.endswith("kernels.py")]
+    found = sum(len(kernels_of(ast.parse(path.read_text("utf-8")))) for path in kernel_files)
     assert found >= 5
 
 

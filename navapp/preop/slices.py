@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.mesh import TriangleMesh
+from navapp.geometry.mesh_sections import count_corners
 from navapp.geometry.transform import FloatArray
 
 Picture = NDArray[np.uint8]
@@ -129,7 +130,8 @@ def cut_contour(
     height = points[:, axis] - position
     # A vertex in the plane counts as above it: every triangle then crosses in two edges or none.
     is_above = height >= 0.0
-    crossing = faces[is_above[faces].any(axis=1) & ~is_above[faces].all(axis=1)]
+    n_above = count_corners(faces, is_above)
+    crossing = faces[(n_above > 0) & (n_above < 3)]
     ends = np.empty((len(crossing), 2, 3))
     found = np.zeros(len(crossing), dtype=int)
     for start, end in ((0, 1), (1, 2), (2, 0)):

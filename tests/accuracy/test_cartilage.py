@@ -51,6 +51,7 @@ def tracked(seed: int, make) -> tuple[tuple[TrackedFrame, float], ...]:
     return tuple(found)
 
 
+@pytest.mark.release
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 def test_cartilage_that_is_known_exactly_costs_nothing(seed: int) -> None:
@@ -67,6 +68,7 @@ def test_a_thickness_map_that_is_0_4_mm_off_costs_at_most_0_6_mm(seed: int) -> N
         assert error_mm <= 0.6
 
 
+@pytest.mark.release
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", [2])
 def test_a_bone_that_is_known_better_in_parts_is_found_from_its_nominal_pose(seed: int) -> None:
@@ -84,6 +86,7 @@ def test_a_bone_that_is_known_better_in_parts_is_found_from_its_nominal_pose(see
     )
 
 
+@pytest.mark.release
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 def test_one_mean_is_not_enough_to_be_shown(seed: int) -> None:

@@ -1,14 +1,13 @@
 """What is made once, or faster: pictures of a board, plans."""
 
 import json
-from functools import partial
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-import navapp.preop
-from navapp.preop import AspectSettings
 from tests.calibration.photographed import KEYS, good_poses, photograph
+from tests.few_views import few_views
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -32,8 +31,7 @@ def good_pairs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return photograph(tmp_path_factory.mktemp("good"), good_poses())
 
 
-@pytest.fixture
-def few_views(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Bones are looked at from few sides: a plan is made in a fraction of the time."""
-    coarse = partial(navapp.preop.build_aspects, settings=AspectSettings(step_deg=45.0))
-    monkeypatch.setattr(navapp.preop, "build_aspects", coarse)
+@pytest.fixture(name="few_views")
+def _few_views() -> Iterator[None]:
+    with few_views():
+        yield

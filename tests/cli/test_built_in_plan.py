@@ -34,6 +34,7 @@ def off_surface_mm(plan, bone, points_mm):
     return distance
 
 
+@pytest.mark.release
 def test_the_bones_are_those_of_the_simulated_room(plan):
     assert set(plan.bones) == {"femur", "tibia", "patella"}
     assert {bone.side for bone in plan.bones.values()} == {"right"}

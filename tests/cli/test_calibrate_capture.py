@@ -45,6 +45,7 @@ def true_error_mm(found):
     return float(np.median(np.linalg.norm(off_mm, axis=1)))
 
 
+@pytest.mark.release
 @pytest.mark.slow
 def test_a_hand_that_follows_every_wish_gives_an_accepted_rig(board, tmp_path):
     config, out, result = tmp_path / "navapp.toml", tmp_path / "out", tmp_path / "result.json"

@@ -102,11 +102,13 @@ def test_the_file_draws_where_the_eye_sees(solved: Path, views: Photographed) ->
     assert report.count("<svg") == 3
 
 
+@pytest.mark.release
 def test_a_display_that_did_not_move_passes(solved: Path, today: list[str], capsys) -> None:
     assert run(["calibrate", "check", "--display", str(solved), *today]) == 0
     assert "the display still holds: guides appear within 0." in capsys.readouterr().out
 
 
+@pytest.mark.release
 def test_a_mirror_that_has_turned_is_told(
     solved: Path, today: list[str], tmp_path: Path, capsys
 ) -> None:

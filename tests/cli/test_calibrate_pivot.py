@@ -108,6 +108,7 @@ def test_the_published_solution_is_found_again(data: Path, tmp_path: Path, capsy
 SMALL = "[camera.simulated]\nscale = 0.6\n"
 
 
+@pytest.mark.release
 def test_a_simulated_pointer_is_calibrated_live(tmp_path, capsys) -> None:
     """Its tip is where the simulated maker has put it, with paper that a printer has stretched."""
     (tmp_path / "small.toml").write_text(SMALL, encoding="utf-8")

@@ -25,6 +25,9 @@ from tests.calibration.photographed import (
     held,
     photograph,
 )
+from tests.many import few_of
+
+pytestmark = pytest.mark.usefixtures("empty_plots")
 
 N_PAIRS = len(GOOD_VIEWS)
 
@@ -150,7 +153,7 @@ BAD_SETS = {
 }
 
 
-@pytest.mark.parametrize("kind", BAD_SETS)
+@pytest.mark.parametrize("kind", few_of(BAD_SETS))
 def test_a_bad_set_is_refused_for_its_own_reason(kind, good_pairs, solve, tmp_path) -> None:
     make, words = BAD_SETS[kind]
     ended = solve(make(good_pairs, tmp_path / "bad"))
@@ -166,6 +169,7 @@ def test_a_bad_set_is_refused_for_its_own_reason(kind, good_pairs, solve, tmp_pa
     assert ended.rig is None
 
 
+@pytest.mark.release
 def test_a_wrong_square_is_refused_by_a_known_distance(good_pairs, solve, tmp_path) -> None:
     board = tmp_path / "other.json"
     board.write_text(json.dumps(KEYS | {"square_mm": 20.0, "marker_mm": 14.0}), encoding="utf-8")
@@ -177,6 +181,7 @@ def test_a_wrong_square_is_refused_by_a_known_distance(good_pairs, solve, tmp_pa
     assert ended.rig is None
 
 
+@pytest.mark.release
 def test_a_blurred_view_is_dropped_and_the_rest_accepted(good_pairs, solve, tmp_path) -> None:
     folder = copied(good_pairs, tmp_path / "bad")
     path = str(folder / name("left", 4))
@@ -213,6 +218,7 @@ def test_a_rig_of_before_stays_when_the_new_one_is_refused(good_pairs, solve, tm
     assert ended.rig.rig_id == RIG.rig_id
 
 
+@pytest.mark.release
 def test_a_picture_that_was_lost_halfway_is_no_crash(good_pairs, solve, tmp_path) -> None:
     """From pair 4 on every right picture is that of the next pair: hardly any two pairs agree."""
     folder = copied(good_pairs, tmp_path / "bad", range(N_PAIRS - 1))

@@ -90,6 +90,7 @@ def test_a_package_is_needed_by_those_who_configured_it(
     assert told["detail"].endswith("ImportError: libserial is missing")
 
 
+@pytest.mark.release
 @pytest.mark.slow
 @pytest.mark.parametrize("broken", few_of(["pydantic", "numba"]))
 def test_a_broken_package_that_all_need_is_told_and_nothing_breaks(tmp_path, broken):

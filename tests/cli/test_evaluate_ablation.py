@@ -75,6 +75,7 @@ def test_what_makes_no_sense_is_refused_in_one_sentence(
     assert not (tmp_path / "a").exists()
 
 
+@pytest.mark.release
 @pytest.mark.slow
 def test_a_quick_look_at_one_case_from_end_to_end(tmp_path, capsys, monkeypatch) -> None:
     out = tmp_path / "a"

@@ -14,6 +14,8 @@ from navapp.evaluation.peers.scores import write_peers
 from tests.evaluation.peers.scored_peers import peer_test
 from tests.evaluation.scored import followed, score
 
+pytestmark = pytest.mark.usefixtures("empty_plots")
+
 ONE = ["--samples", "man", "--stages", "opening", "--situations", "overlay", "--methods", "bimcc",
        "--quick", "--seed", "1"]  # fmt: skip
 SETTINGS = TableSettings((Case("man", "opening", "overlay"),), ("bimcc",), 1, 5, 1, is_quick=True)
@@ -55,6 +57,7 @@ def test_the_peers_come_after_ours_and_stand_beside_them(ran, tmp_path, capsys) 
     assert len((out / "peers.csv").read_text().splitlines()) == 3
 
 
+@pytest.mark.release
 def test_they_are_kept(ran, tmp_path) -> None:
     out = tmp_path / "out"
     for options in (["--peers"], ["--peers"], []):

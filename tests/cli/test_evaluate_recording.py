@@ -13,6 +13,8 @@ from navapp.geometry.ply import read_ply
 from navapp.preop import AspectSettings, build_aspects, write_plan
 from navapp.values import BoneModel, Plan
 
+pytestmark = pytest.mark.usefixtures("empty_plots")
+
 
 @pytest.fixture(scope="module")
 def plan(data, tmp_path_factory) -> Path:
@@ -89,6 +91,7 @@ def test_touched_points_of_one_recording(plan, recordings, tmp_path) -> None:
     assert "2 points of the femur, touched 2 times" in (out / "tables.md").read_text("utf-8")
 
 
+@pytest.mark.release
 def test_a_motion_of_a_moment_does_not_determine_another_tracker(
     plan, recordings, tmp_path, capsys
 ) -> None:

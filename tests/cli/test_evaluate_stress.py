@@ -75,6 +75,7 @@ def test_axes_are_of_the_stress_matrix(tmp_path, capsys) -> None:
     assert "add --stress" in capsys.readouterr().err
 
 
+@pytest.mark.release
 @pytest.mark.slow
 def test_a_surface_beside_its_targets_is_off_by_as_much_and_looks_well(tmp_path) -> None:
     out = tmp_path / "a"

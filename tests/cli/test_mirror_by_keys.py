@@ -80,6 +80,7 @@ def test_a_simulated_eye_calibrates_its_display(board: str, tmp_path: Path, seed
     assert "told; alignments cannot tell" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.release
 def test_a_camera_that_is_lost_keeps_what_was_asked_for(board: str, tmp_path: Path, capsys) -> None:
     fault = 'faults = [{kind = "unplug", start_s = 2.0, duration_s = inf}]\n'
     config = small_room(tmp_path / "navapp.toml", 0, fault)
@@ -108,7 +109,7 @@ def opened_session(board: str, *more: str):
     return make_session(opened, read_board(board), options, configuration), opened
 
 
-@pytest.mark.parametrize("more", [(), ("--headless",)], ids=["screen", "headless"])
+@pytest.mark.parametrize("more", few_of([(), ("--headless",)]), ids=["screen", "headless"])
 def test_the_session_never_gets_hold_of_the_mirror_or_of_what_an_eye_aims_at(
     board: str, more: tuple[str, ...]
 ) -> None:

@@ -10,6 +10,7 @@ import SimpleITK
 from navapp.cli.main import run
 from navapp.preop import read_origin, read_plan, read_plan_view
 from navapp.preop.slices import DIRECTIONS
+from tests.few_views import few_views
 
 SPACING_MM = (0.8, 0.8, 1.0)
 TURN = np.array([[0.96, -0.28, 0.0], [0.28, 0.96, 0.0], [0.0, 0.0, 1.0]])
@@ -43,10 +44,11 @@ def labels(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def planned(labels: Path) -> Path:
     folder = labels.parent / "plan"
-    assert run([
-        "plan", "--labels", str(labels), "--label", "femur=5", "--label", "tibia=6",
-        "--side", "left", "--out", str(folder), "--json", str(labels.parent / "made.json"),
-    ]) == 0  # fmt: skip
+    with few_views():
+        assert run([
+            "plan", "--labels", str(labels), "--label", "femur=5", "--label", "tibia=6",
+            "--side", "left", "--out", str(folder), "--json", str(labels.parent / "made.json"),
+        ]) == 0  # fmt: skip
     return folder
 
 
@@ -63,7 +65,7 @@ def test_a_segmentation_becomes_bones_where_it_lies(planned) -> None:
 
 def test_the_folder_holds_edges_pictures_and_a_summary(planned) -> None:
     plan = read_plan(planned)
-    assert len(plan.aspects["femur"]) > 100
+    assert len(plan.aspects["femur"]) > 9
     page = (planned / "summary.html").read_text(encoding="utf-8")
     assert "not for clinical use" in page
     assert page.count("data:image/png;base64,") == 2

@@ -70,6 +70,7 @@ def test_the_picture_s_middle_is_at_the_bone() -> None:
     assert not model.flips_rows
 
 
+@pytest.mark.release
 def test_a_recorded_session_holds_the_display_that_its_configuration_names(tmp_path: Path) -> None:
     folder = tmp_path / "kept"
     run(["--quiet", "run", "--mirror", "--headless", "--frames", "2", "--record", str(folder)])

@@ -41,6 +41,7 @@ def points_of(error_px: float) -> list[str]:
     return [f"femur/{one.name}={one.left_px[0]},{one.left_px[1]}" for one in picked(3, error_px)]
 
 
+@pytest.mark.release
 def test_three_landmarks_make_a_prior_that_finds_the_bone(files, tmp_path) -> None:
     out, told = tmp_path / "prior.json", tmp_path / "told.json"
     assert make(files, out, "--points", *points_of(4.0), "--json", str(told)) == 0

@@ -13,6 +13,7 @@ from drivers.window_display import WindowDisplay
 from drivers.window_process import WindowSettings
 from navapp.control.states import DeviceHealth, EventLevel
 from tests.control.fakes import HEIGHT, WIDTH, Bench, navigating, wait_for
+from tests.many import few_of
 from tests.x_servers import seen, xvfb
 
 # Pictures last for a minute here: only the loss itself can darken, on however busy a machine.
@@ -30,7 +31,7 @@ class SeenWindow(WindowDisplay):
         return seen(self._server, 0, 0, WIDTH, HEIGHT)
 
 
-@pytest.mark.parametrize("blow", [signal.SIGKILL, signal.SIGSTOP])
+@pytest.mark.parametrize("blow", few_of([signal.SIGKILL, signal.SIGSTOP]))
 def test_a_window_that_dies_or_freezes_is_dark_told_and_opened_again(monkeypatch, blow) -> None:
     with xvfb(WIDTH, HEIGHT) as server:
         monkeypatch.setenv("DISPLAY", server)

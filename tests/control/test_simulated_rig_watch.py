@@ -52,6 +52,7 @@ def until_s(room: SimulatedRoom, seconds: float) -> None:
         room.frames(1)
 
 
+@pytest.mark.release
 @pytest.mark.slow
 def test_a_camera_turned_up_by_two_hundredths_of_a_degree_ends_the_trust(undo: ExitStack) -> None:
     room = navigating(

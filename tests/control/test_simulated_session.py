@@ -119,6 +119,7 @@ def test_the_scripted_session_refuses_the_turned_pose_and_navigates_on_the_right
     assert any(result.is_navigable for result in room.results)
 
 
+@pytest.mark.release
 @pytest.mark.slow
 def test_an_unplugged_camera_that_comes_back_is_navigated_on(undo) -> None:
     faults = FaultScript(

@@ -56,6 +56,7 @@ def test_its_own_tests_run_the_whole_contract(site, tmp_path):
     assert int(passed[1]) >= len(CAMERA_CHECKS) + 2
 
 
+@pytest.mark.release
 def test_the_contract_runs_on_the_camera_of_a_configuration(site, tmp_path):
     """As it does on hardware: `pytest --hardware=FILE tests/contracts`."""
     path = tmp_path / "connected.toml"

@@ -7,6 +7,7 @@ from navapp.config import Configuration, SimulationSection
 from navapp.config.camera_sections import CameraSection
 from navapp.devices import open_live
 from navapp.devices.simulated_room import find_cartilage_mm
+from tests.many import few_of
 
 SMALL = {"seed": 3, "scale": 0.25, "motion": "still", "stepped": True}
 
@@ -31,6 +32,7 @@ def test_less_light_is_darker_and_more_is_brighter(usual) -> None:
     assert levels[1] > 1.3 * usual[0].mean()
 
 
+@pytest.mark.release
 def test_fewer_electrons_are_more_noise(usual) -> None:
     def noise(settings) -> float:
         exact = take(full_well_e=1e9, read_noise_e=0.0)[0]
@@ -61,7 +63,7 @@ def test_the_rig_has_the_configured_baseline() -> None:
     assert take(baseline_mm=120.0)[1].rig.baseline_mm == pytest.approx(120.0)
 
 
-@pytest.mark.parametrize(("share", "side"), [(0.3, "right"), (0.6, "left")])
+@pytest.mark.parametrize(("share", "side"), few_of([(0.3, "right"), (0.6, "left")]))
 def test_a_cloth_hides_its_share_of_the_bone_from_the_second_picture_on(share, side) -> None:
     open_picture, opened = take(2, side=side)
     first, _ = take(1, side=side, covered=share)

@@ -20,6 +20,7 @@ from tests.drivers.usb_rigs import UsbRig
 pytestmark = needs_descriptors
 
 
+@pytest.mark.release
 @pytest.mark.slow
 @pytest.mark.parametrize("n_cycles", CYCLES)
 def test_many_unplugged_usb_cameras_leave_nothing(tmp_path, n_cycles):

@@ -12,6 +12,7 @@ TESTS = ("tests/drivers/preloaded_v4l2.py", "tests/drivers/discovery/preloaded_v
 N_LEAST = 35
 
 
+@pytest.mark.release
 @pytest.mark.slow
 def test_drivers_and_listing_work_above_the_kernels_own_questions(tmp_path):
     library, root = v4l2(tmp_path)

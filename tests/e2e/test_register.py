@@ -121,6 +121,7 @@ def test_a_bone_is_found(bone: Bone, angle_deg: float, shift_mm: float, more: li
     assert "best_guess" not in found
 
 
+@pytest.mark.release
 def test_the_predicted_error_and_covariance_belong_to_the_error(bone: Bone) -> None:
     found = register(bone.scene, bone.model, "--initial", bone.start(5.0, 5.0))
     covariance = np.array(found["covariance"])
@@ -129,6 +130,7 @@ def test_the_predicted_error_and_covariance_belong_to_the_error(bone: Bone) -> N
     assert bone.tre(found["scene_from_model"]) < found["predicted_tre"] < 0.5
 
 
+@pytest.mark.release
 def test_the_covariance_is_about_the_mean_of_the_file(bone: Bone) -> None:
     # Strays that are left out move the mean that the user sees, not the pose.
     far = np.array([[400.0, 0, 0], [401.0, 0, 0], [400.0, 1, 0]])
@@ -191,6 +193,7 @@ def test_without_a_unit_any_size_is_found(bone: Bone, scale: float) -> None:
     assert found["rms"] == pytest.approx(0.3 * scale, rel=0.3)
 
 
+@pytest.mark.release
 def test_the_pose_of_a_result_or_a_text_starts_the_next(bone: Bone) -> None:
     found = register(bone.scene, bone.model, "--initial", bone.start(10.0, 8.0))
     again = bone.folder / "again.json"
@@ -363,7 +366,7 @@ def test_a_plate_slides_and_the_reasons_say_where(tmp_path: Path, capsys) -> Non
     assert "scene_from_model" in told.out
 
 
-@pytest.mark.parametrize("method", ["bimcc", "icp"])
+@pytest.mark.parametrize("method", few_of(["bimcc", "icp"]))
 def test_a_ball_turns_and_is_no_registration(tmp_path: Path, method: str) -> None:
     ball = sphere(25.0, 60)
     cap = ball.vertices_mm[ball.vertices_mm[:, 2] < -8.0]
@@ -376,7 +379,7 @@ def test_a_ball_turns_and_is_no_registration(tmp_path: Path, method: str) -> Non
     assert found["reasons"]
 
 
-@pytest.mark.parametrize("larger", ["scene", "model"])
+@pytest.mark.parametrize("larger", few_of(["scene", "model"]))
 @pytest.mark.parametrize("units", few_of(["mm", "m", "none"]))
 def test_files_of_different_units_are_noticed(bone: Bone, larger: str, units: str, capsys) -> None:
     small, scale = (bone.model, 1e-3) if larger == "scene" else (bone.scene, 1e-3)
@@ -392,6 +395,7 @@ def test_files_of_different_units_are_noticed(bone: Bone, larger: str, units: st
         assert f"--units says {units}" in told
 
 
+@pytest.mark.release
 def test_metres_taken_for_millimetres_do_not_pass(bone: Bone, capsys) -> None:
     bone.write(1e-3, "")
     found = register(bone.scene, bone.model, "--initial", bone.start(5.0, 5.0, 1e-3), code=4)
@@ -418,7 +422,7 @@ def test_repeated_points_count_once(bone: Bone) -> None:
     assert "1497 of 1500 points repeat others" in found["warnings"][0]
 
 
-@pytest.mark.parametrize("shape", ["line", "plane"])
+@pytest.mark.parametrize("shape", few_of(["line", "plane"]))
 def test_flat_and_straight_scenes_are_no_registration(bone: Bone, shape: str) -> None:
     middle = bone.mesh.vertices_mm[np.argmin(bone.mesh.vertices_mm[:, 2])]
     table = bone.rng.uniform(-30, 30, (800, 3))
@@ -431,12 +435,14 @@ def test_flat_and_straight_scenes_are_no_registration(bone: Bone, shape: str) ->
     assert found["reasons"]
 
 
+@pytest.mark.release
 def test_a_straight_model_is_no_registration(bone: Bone) -> None:
     write_ply(bone.model, TriangleMesh(np.outer(np.arange(300.0), [0.3, 0, 0]), NO_FACES))
     found = register(bone.scene, bone.model, "--initial", bone.start(0.0, 0.0), code=4)
     assert found["scene_from_model"] is None
 
 
+@pytest.mark.release
 def test_points_that_are_not_finite_are_told(bone: Bone) -> None:
     points = bone.points.copy()
     points[::9] = np.nan
@@ -447,6 +453,7 @@ def test_points_that_are_not_finite_are_told(bone: Bone) -> None:
     assert bone.tre(found["scene_from_model"]) < 0.25
 
 
+@pytest.mark.release
 @pytest.mark.slow
 def test_a_large_cloud_is_subsampled_and_it_says_so(bone: Bone) -> None:
     many = np.repeat(bone.points[:1500], 140, axis=0)
@@ -460,6 +467,7 @@ def test_a_large_cloud_is_subsampled_and_it_says_so(bone: Bone) -> None:
     assert second["scene_from_model"] == first["scene_from_model"]
 
 
+@pytest.mark.release
 @pytest.mark.slow
 @pytest.mark.parametrize("is_mesh", few_of([True, False]))
 def test_a_fine_model_is_thinned_and_it_says_so(bone: Bone, is_mesh: bool) -> None:
@@ -545,6 +553,7 @@ def test_numbers_beyond_all_measure_are_refused(bone: Bone, which, coordinate, c
     refused([bone.scene, bone.model], capsys, 3, path.name, "a coordinate of 1e+")
 
 
+@pytest.mark.release
 def test_a_point_far_away_does_no_harm(bone: Bone) -> None:
     start = bone.start(5.0, 5.0)
     bone.points[0] = 1e8
@@ -603,7 +612,7 @@ def test_a_target_that_cannot_be_written_is_refused_first(bone: Bone, option: st
 
 
 @pytest.mark.data
-@pytest.mark.parametrize("more", [[], ["--global"]])
+@pytest.mark.parametrize("more", few_of([[], ["--global"]]))
 def test_two_scans_of_a_bunny(data: Path, tmp_path: Path, more: list[str]) -> None:
     folder = data / "reg" / "pcl_bunny"
     out = tmp_path / "o.json"
@@ -620,6 +629,7 @@ def test_two_scans_of_a_bunny(data: Path, tmp_path: Path, more: list[str]) -> No
     assert np.linalg.norm(pose.translation_mm - published.translation_mm) < 3e-3
 
 
+@pytest.mark.release
 @pytest.mark.data
 @pytest.mark.slow
 def test_two_surfaces_without_a_unit(data: Path, tmp_path: Path) -> None:
@@ -640,6 +650,7 @@ def test_two_surfaces_without_a_unit(data: Path, tmp_path: Path) -> None:
         assert np.sqrt((ours[:n] ** 2).mean()) <= 1.01 * np.sqrt((theirs[:n] ** 2).mean())
 
 
+@pytest.mark.release
 def test_people_are_told_no_unit_where_the_files_have_none(
     bone: Bone, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -652,6 +663,7 @@ def test_people_are_told_no_unit_where_the_files_have_none(
     assert not re.search(r"\d (mm|m)\b", told.out + told.err)
 
 
+@pytest.mark.release
 def test_files_without_a_unit_that_differ_in_size_are_told_so(
     bone: Bone, capsys: pytest.CaptureFixture[str]
 ) -> None:

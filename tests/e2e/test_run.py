@@ -183,6 +183,7 @@ name = "femur_distal"
 """
 
 
+@pytest.mark.release
 def test_a_session_with_cuts_replays_and_keeps_them_whatever_is_changed(
     tmp_path: Path, moving: Path
 ) -> None:
@@ -241,24 +242,35 @@ def test_the_tibia_is_found_from_the_accepted_femur_and_a_replay_finds_it_in_the
                 assert body[key] == b["bodies"][name][key]
 
 
-@pytest.mark.slow
-def test_a_drawn_box_is_all_that_a_registration_needs_and_it_replays(
-    tmp_path: Path, moving: Path
-) -> None:
-    script, session, out = (tmp_path / name for name in ("script.toml", "session", "b.json"))
+@pytest.fixture(scope="module")
+def boxed(tmp_path_factory: pytest.TempPathFactory, moving: Path) -> Path:
+    """A session in which somebody draws a box, and its result, `a.json`; nobody writes into it."""
+    folder = tmp_path_factory.mktemp("boxed")
+    script = folder / "script.toml"
     # Around what is seen of the femur, as a hand would draw it.
     script.write_text('[[step]]\ndo = "register"\nbox = [385, 115, 180, 175]\n', encoding="utf-8")
     options = ["--quiet", "--config", str(moving), "run", "--headless", "--frames", "4"]
-    files = ["--record", str(session), "--json", str(tmp_path / "a.json")]
+    files = ["--record", str(folder / "session"), "--json", str(folder / "a.json")]
     assert run([*options, "--operator", str(script), *files]) == 0
-    frames = result(tmp_path / "a.json")["frames"]
+    return folder
+
+
+@pytest.mark.slow
+def test_a_drawn_box_is_all_that_a_registration_needs(boxed: Path) -> None:
+    frames = result(boxed / "a.json")["frames"]
     tracked = [frame for frame in frames if frame["state"] == "navigating"]
     assert tracked
     assert all(frame["tre_mm"] < 0.4 for frame in tracked)
-    (asked,) = [event for event in events_of(session) if event.get("command") == "register"]
-    assert asked["start"] == {"box": [385, 115, 180, 175]}
+    registers = [e for e in events_of(boxed / "session") if e.get("command") == "register"]
+    assert [event["start"] for event in registers] == [{"box": [385, 115, 180, 175]}]
+
+
+@pytest.mark.slow
+@pytest.mark.release
+def test_a_drawn_box_is_replayed(boxed: Path, tmp_path: Path) -> None:
+    session, out = Path(shutil.copytree(boxed / "session", tmp_path / "session")), tmp_path / "b"
     assert run(["--quiet", "replay", str(session), "--json", str(out)]) == 0
-    for a, b in zip(frames, result(out)["frames"], strict=True):
+    for a, b in zip(result(boxed / "a.json")["frames"], result(out)["frames"], strict=True):
         assert a["camera_from_model"] == b["camera_from_model"]
     # Whatever is changed, the bone is looked for where it was drawn: the prior knows nothing.
     (session / "prior.json").write_text("{}", encoding="utf-8")
@@ -327,6 +339,7 @@ def make_foreign_plan(folder: Path) -> Path:
     return folder / "foreign"
 
 
+@pytest.mark.release
 @pytest.mark.slow
 def test_a_recording_with_dropped_frames_replays_to_the_same_poses(
     tmp_path: Path, recorded: Path, session: Path

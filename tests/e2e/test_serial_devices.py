@@ -30,7 +30,7 @@ def configured(folder: Path, stage: str = STAGE_SERIAL) -> list[str]:
 @pytest.mark.slow
 def test_a_session_turns_the_mirror_to_its_place_and_replays_without_it(tmp_path: Path) -> None:
     session, first, second = tmp_path / "session", tmp_path / "a.json", tmp_path / "b.json"
-    recording = ["run", "--headless", "--frames", "10", "--record", str(session)]
+    recording = ["run", "--headless", "--frames", "7", "--record", str(session)]
     with projector_terminal(tmp_path), stage_terminal(tmp_path) as stage:
         assert run([*configured(tmp_path), *recording, "--json", str(first)]) == 0
         assert stage.wire.firmware.true_deg == pytest.approx(30.0, abs=0.01)

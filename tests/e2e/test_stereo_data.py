@@ -28,6 +28,7 @@ def test_cones(data: Path, tmp_path: Path) -> None:
     assert found.occluded_px <= 3.3
 
 
+@pytest.mark.release
 @pytest.mark.data
 @pytest.mark.slow
 def test_aloe(data: Path, tmp_path: Path) -> None:

@@ -16,6 +16,8 @@ from navapp.evaluation.paper.results import write_results
 from navapp.evaluation.paper.settings import TableSettings
 from tests.evaluation.scored import followed, score
 
+pytestmark = pytest.mark.usefixtures("empty_plots")
+
 SETTINGS = TableSettings(ALL_CASES[:2], ("paper", "bimcc"), 2, 3, 1)
 NAMES = [test.name for test in SETTINGS.tests]
 

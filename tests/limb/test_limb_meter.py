@@ -70,6 +70,7 @@ def test_surfaces_that_overlap_have_a_gap_below_zero_as_deep_as_they_do() -> Non
             assert gap.mm == pytest.approx(-depth_mm, abs=0.1)
 
 
+@pytest.mark.release
 def test_bones_that_are_pushed_together_overlap_and_the_bound_is_that_of_two_points() -> None:
     bones = make_knee(KneeSpec(1, "right")).bones
     meter = GapMeter(bones["femur"], bones["tibia"], 0.0, "right")

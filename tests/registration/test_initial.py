@@ -31,6 +31,7 @@ from navapp.registration.initial_kernels import (
 )
 from navapp.values import AspectGraph
 from tests.bones import femur_model
+from tests.many import few_of
 from tests.reference import initial_reference as reference
 from tests.registration.shapes import GEOMETRY
 
@@ -92,7 +93,7 @@ def is_right(pose: RigidTransform) -> bool:
     return error_mm(pose) < 3.0
 
 
-@pytest.mark.parametrize("has_aspects", [True, False])
+@pytest.mark.parametrize("has_aspects", few_of([True, False]))
 def test_a_bone_is_found_in_the_whole_view_without_a_pose(has_aspects: bool) -> None:
     pair, scene = seen()
     told: list[float] = []
@@ -108,6 +109,7 @@ def test_a_bone_is_found_in_the_whole_view_without_a_pose(has_aspects: bool) -> 
     assert sum(is_right(one.scene_from_bone) for one in found) == 1
 
 
+@pytest.mark.release
 def test_the_search_twice_gives_the_same() -> None:
     pair, scene = seen()
     first, second = (find_initial(pair, scene, model(), CONE, aspects()) for _ in range(2))

@@ -78,6 +78,7 @@ def grid_of(points: np.ndarray, every: int, voxel_mm: float) -> VoxelGrid:
     return grid
 
 
+@pytest.mark.release
 @pytest.mark.kernel
 @given(
     seed=st.integers(0, 2**32 - 1),

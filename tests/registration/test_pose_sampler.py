@@ -102,6 +102,7 @@ def test_any_first_points_are_spread() -> None:
     assert np.ptp(np.bincount((points[order[:64]] > 5) @ (1, 2, 4), minlength=8)) < np.ptp(chance)
 
 
+@pytest.mark.release
 def test_the_same_map_gives_the_same_bits() -> None:
     depth = DepthMap.of(GEOMETRY, seen_map())
     first, second = (sampler().search(depth, TRUE, 1)[0].scene_from_bone for _ in range(2))

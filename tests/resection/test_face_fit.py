@@ -10,6 +10,7 @@ from navapp.resection.face_fit import (
     fit_disparity_plane,
     plane_in_camera,
 )
+from tests.many import few_of
 from tests.stereo.pairs import geometry
 
 PLANE = np.array([0.02, -0.03, 130.0])
@@ -81,7 +82,7 @@ def test_the_covariance_is_that_of_errors_that_neighbours_share() -> None:
     np.testing.assert_allclose(found, expected, rtol=2e-3, atol=1e-4 * np.abs(expected).max())
 
 
-@pytest.mark.parametrize("noise_px", [0.05, 0.1, 0.15])
+@pytest.mark.parametrize("noise_px", few_of([0.05, 0.1, 0.15]))
 @pytest.mark.parametrize("half_px", [(30, 6), (20, 10), (30, 30)])
 def test_bounds_of_narrow_faces_hold(
     half_px: tuple[int, int], noise_px: float, monkeypatch: pytest.MonkeyPatch

@@ -47,6 +47,7 @@ def measured(meter: FaceMeter, left, right) -> tuple[MeasuredFace, float]:
     return face, abs(errors(face)[1])
 
 
+@pytest.mark.release
 def test_glints_that_each_eye_sees_elsewhere_do_not_move_the_face(meter: FaceMeter) -> None:
     face, off_mm = measured(meter, *pictures(pose(), glint=0.1))
     assert face.is_told
@@ -66,6 +67,7 @@ def test_clipped_pixels_move_no_face_that_is_told(meter: FaceMeter) -> None:
         assert face is None or not face.is_told or abs(errors(face)[1]) <= face.bound_mm
 
 
+@pytest.mark.release
 def test_a_lamp_that_is_not_white_in_the_pictures_is_in_the_bound(meter: FaceMeter) -> None:
     for lamp in ((0.85, 0.95, 1.0), (0.7, 0.9, 1.0), (1.0, 0.95, 0.8)):
         face, off_mm = measured(meter, *pictures(pose(), glint=0.25, lamp=lamp))
@@ -106,6 +108,7 @@ def test_a_face_that_is_hidden_or_looks_away_is_not_measured(meter: FaceMeter) -
     assert meter.measure(*pictures(pose()), estimate(away), PLANNED, ()) is None
 
 
+@pytest.mark.release
 def test_measurements_of_one_view_join_and_are_known_no_better_than_one(meter: FaceMeter) -> None:
     faces = []
     for seed in range(4):

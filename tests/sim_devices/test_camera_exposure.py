@@ -161,6 +161,7 @@ def test_each_row_of_the_leg_is_as_a_picture_of_its_own_time_has_it():
     assert own_error < 0.4 * middle_error
 
 
+@pytest.mark.release
 def test_the_leg_is_the_mean_of_the_pictures_of_its_exposure():
     world, frame = take(DRIFTING, is_blurred=True)
     times_ns = AT_NS + np.linspace(-4.0 * MS, 4.0 * MS, 41).astype(int)

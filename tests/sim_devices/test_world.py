@@ -205,6 +205,7 @@ def test_a_left_knee_is_the_mirror_image_of_a_right_one():
     assert (difference > 0.05).mean() < 0.01
 
 
+@pytest.mark.release
 def test_the_texture_of_bone_has_the_contrast_asked_for():
     for contrast in (0.03, 0.05, 0.08):
         with_texture, without = (
@@ -317,6 +318,7 @@ def test_edges_of_large_triangles_follow_the_lens():
         assert off.max() < 0.05
 
 
+@pytest.mark.release
 def test_block_matching_finds_the_bone():
     import cv2
 

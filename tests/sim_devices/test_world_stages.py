@@ -147,6 +147,7 @@ def test_metal_mirrors_the_lamps_and_bone_does_not() -> None:
     assert table[MaterialId.METAL, 22] <= 0.2
 
 
+@pytest.mark.release
 def test_the_pose_of_an_earlier_picture_is_still_known_after_the_knee_has_changed() -> None:
     site = World(PLAIN)
     site.states.set_stage("spacer")

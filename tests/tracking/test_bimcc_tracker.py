@@ -16,6 +16,7 @@ from navapp.tracking.judging import PoseJudge
 from navapp.tracking.search.near import NearSearch
 from navapp.tracking.surface_meter import WIDE_BOX
 from navapp.values import FrameTimings, Prior, Reason, Status, Stopwatch, TrackedFrame, Verdict
+from tests.many import few_of
 from tests.tracking.meters import Listening
 from tests.tracking.rooms import GOAL, Room, room
 
@@ -32,7 +33,7 @@ def follow(a: Room, tracker: BimccTracker, start_off=(0.0,) * 6):
     return answers, state
 
 
-@pytest.mark.parametrize("motion", ["still", "patient"])
+@pytest.mark.parametrize("motion", few_of(["still", "patient"]))
 @pytest.mark.slow
 def test_a_knee_is_followed(motion: str) -> None:
     a = room(motion)
@@ -52,6 +53,7 @@ def test_following_twice_gives_the_same_bits() -> None:
         assert one.left_from_bone.matrix.tobytes() == other.left_from_bone.matrix.tobytes()
 
 
+@pytest.mark.release
 @pytest.mark.slow
 def test_grey_pictures_do_as_well() -> None:
     a = room(is_grey=True, n_frames=2)
@@ -196,7 +198,7 @@ def test_a_frame_that_is_tracked_asks_for_all_that_a_glance_does_not() -> None:
 
 
 @pytest.mark.parametrize(
-    ("n_lost", "searches"), [(1, [3, 0]), (2, [3, 0]), (3, []), (4, [3, 0]), (5, [])]
+    ("n_lost", "searches"), few_of([(1, [3, 0]), (2, [3, 0]), (3, []), (4, [3, 0]), (5, [])], 2)
 )
 def test_a_lost_bone_is_looked_for_in_every_frame_and_searched_in_some(
     n_lost: int, searches: list[int]

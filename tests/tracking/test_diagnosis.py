@@ -115,6 +115,7 @@ def test_lights_out_is_not_called_swapped() -> None:
     assert found.verdict.cause is None
 
 
+@pytest.mark.release
 @pytest.mark.slow
 def test_the_other_knees_plan_is_called_so_and_stays_so() -> None:
     found = registered("other side")

@@ -81,6 +81,7 @@ def test_the_first_registration_finds_the_bone_without_a_pose(is_in_box: bool) -
     assert told[-1] == 1.0
 
 
+@pytest.mark.release
 @pytest.mark.slow
 def test_a_box_alone_will_do_on_grey_pictures_and_without_aspects() -> None:
     a = room(is_grey=True, n_frames=2)

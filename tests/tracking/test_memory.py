@@ -44,6 +44,7 @@ def settled_bytes() -> int:
     return min(looks)
 
 
+@pytest.mark.release
 @pytest.mark.slow
 def test_nothing_is_kept_of_the_frames_that_have_passed() -> None:
     a = room()

@@ -49,6 +49,7 @@ def test_what_goes_wrong_shows_no_wrong_pose_and_is_over_soon(name: str) -> None
             assert one.tracked.verdict.reasons[0] is Reason.PICTURE_DARK
 
 
+@pytest.mark.release
 @pytest.mark.slow
 def test_a_bone_that_moved_far_in_the_dark_is_found_again() -> None:
     """The search around the last pose alone does not find this one."""

@@ -166,6 +166,7 @@ def moving_room(shutter_ms: float, skew_ms: float):
     return render_room(Configuration(camera=camera), "opening", 17)
 
 
+@pytest.mark.release
 @pytest.mark.slow
 @pytest.mark.parametrize(("shutter_ms", "skew_ms"), [(15.0, 0.0), (0.0, 3.0)])
 def test_a_carried_bone_is_measured_as_if_all_rows_had_been_exposed_at_once(

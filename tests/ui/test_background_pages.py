@@ -23,12 +23,10 @@ from navapp.values import Prior, RowCheck
 from tests.control.fakes import a_plan, a_rig
 from tests.control.held_pointer import POINTER
 from tests.ui import snapshots
+from tests.ui.terminals import SIZES
 from tests.ui.test_app import BellCounter, play
 
 TODAY = date(2026, 3, 1)
-SIZES = pytest.mark.parametrize(
-    "size", [(80, 24), (160, 48), (200, 60)], ids=["80x24", "160x48", "200x60"]
-)
 
 
 def a_background(quality: RigQuality | None = None, **changes: Any) -> Background:

@@ -14,6 +14,7 @@ from tests.ui.accuracy_test.test_app import WAITING
 from tests.ui.capture.test_app import SEEKING
 from tests.ui.guided import Session
 from tests.ui.mirror_alignment.test_app import ALIGNING
+from tests.ui.terminals import SIZES
 from tests.ui.tool_calibration.test_app import PIVOTING
 
 SCREENS: dict[str, tuple[type[Any], Any]] = {
@@ -24,9 +25,7 @@ SCREENS: dict[str, tuple[type[Any], Any]] = {
 }
 
 
-@pytest.mark.parametrize(
-    "size", [(80, 24), (160, 48), (200, 60)], ids=["80x24", "160x48", "200x60"]
-)
+@SIZES
 @pytest.mark.parametrize("screen", list(SCREENS))
 def test_screen(screen: str, size: tuple[int, int], snap_compare: Callable[..., bool]) -> None:
     make_app, snapshot = SCREENS[screen]

@@ -17,6 +17,7 @@ from navapp.ui.pictures.picture_view import PictureView
 from navapp.ui.pose_panel import PosePanel
 from navapp.ui.symbols import ASCII
 from tests.ui import snapshots
+from tests.ui.terminals import SIZES
 from tests.ui.test_app import BellCounter, play
 from tests.ui.test_steps_page import STEPS
 from tests.ui.test_tools_page import a_snapshot as with_tools
@@ -29,11 +30,6 @@ STATES: dict[str, tuple[Callable[[], Snapshot], str, str]] = {
     "starting": (snapshots.starting, "NAVIGABLE  NO", "left view · NO GUIDES"),
     "blanked": (snapshots.blanked, "NAVIGABLE  NO", "left view · BLANKED, the display is dark"),
 }
-
-
-SIZES = pytest.mark.parametrize(
-    "size", [(80, 24), (160, 48), (200, 60)], ids=["80x24", "160x48", "200x60"]
-)
 
 
 @SIZES

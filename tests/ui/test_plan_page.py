@@ -15,11 +15,8 @@ from navapp.ui.main_screen import MainScreen
 from navapp.ui.plan_page import PlanPage, SlicePicture
 from navapp.ui.plan_texts import PlanFacts, SliceText
 from tests.ui import plans, snapshots
+from tests.ui.terminals import SIZES
 from tests.ui.test_app import Script
-
-SIZES = pytest.mark.parametrize(
-    "size", [(80, 24), (160, 48), (200, 60)], ids=["80x24", "160x48", "200x60"]
-)
 
 
 def make_app(plan: PlanView | None) -> NavigationApp:

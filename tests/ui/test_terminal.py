@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.many import few_of
+
 pytestmark = pytest.mark.waits
 
 ROOT = Path(__file__).parents[2]
@@ -106,6 +108,7 @@ def test_keys_end_it_and_native_noise_stays_out_of_the_picture(tmp_path: Path) -
         screen.close()
 
 
+@pytest.mark.release
 def test_the_mouse_is_asked_for(tmp_path: Path) -> None:
     screen = Screen(tmp_path, "run")
     try:
@@ -116,7 +119,7 @@ def test_the_mouse_is_asked_for(tmp_path: Path) -> None:
         screen.close()
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("number", few_of([signal.SIGTERM, signal.SIGHUP]))
 def test_a_signal_ends_it_in_order(tmp_path: Path, number: signal.Signals) -> None:
     screen = Screen(tmp_path, "run")
     try:
@@ -129,7 +132,7 @@ def test_a_signal_ends_it_in_order(tmp_path: Path, number: signal.Signals) -> No
         screen.close()
 
 
-@pytest.mark.parametrize("is_told", [True, False])
+@pytest.mark.parametrize("is_told", few_of([True, False]))
 def test_a_closed_terminal_stops_the_session(tmp_path: Path, is_told: bool) -> None:
     screen = Screen(tmp_path, "run")
     try:

@@ -18,9 +18,9 @@ from navapp.ui.picks_page import PicksPage
 from navapp.ui.tools_page import LANDMARK_KEYS, ToolsPage, ToolTable
 from tests.control.held_pointer import POINTER
 from tests.ui import snapshots
+from tests.ui.terminals import SIZES
 from tests.ui.test_app import BellCounter, play
 
-SIZES = [(80, 24), (160, 48), (200, 60)]
 LANDMARKS = {
     "femur/medial_condyle": np.array([20.0, 0.0, 0.0]),
     "femur/notch": np.array([0.0, 0.0, 0.0]),
@@ -66,7 +66,7 @@ def test_the_letters_mean_nothing_else_on_the_page() -> None:
     assert not kept & set(LANDMARK_KEYS)
 
 
-@pytest.mark.parametrize("size", SIZES)
+@SIZES
 def test_tool_and_check_are_told_at_all_sizes(size: tuple[int, int]) -> None:
     text = text_at(size, a_snapshot())
     for words in (

@@ -75,6 +75,7 @@ def test_a_view_in_which_something_moved_is_dropped_and_told() -> None:
     assert found.model.quality.reasons == ("only 4 views can be used, 6 are needed",)
 
 
+@pytest.mark.release
 def test_the_pitch_is_found_when_it_is_not_told() -> None:
     setup, views, _ = some_views(5, 8)
     found: DisplayCalibration = solve_display(scene(), views, Told())

@@ -118,6 +118,7 @@ def judged(found: Calibration, **changes) -> Calibration:
     return replace(found, rig=replace(found.rig, quality=replace(found.rig.quality, **changes)))
 
 
+@pytest.mark.usefixtures("empty_plots")
 def test_a_refused_rig_says_why(found) -> None:
     reasons = ("only 6 pairs can be used, 8 are needed", "the board was shown frontally")
     text = make_page(judged(found, is_accepted=False, reasons=reasons), Limits())
@@ -126,6 +127,7 @@ def test_a_refused_rig_says_why(found) -> None:
     assert "Accepted." not in words
 
 
+@pytest.mark.usefixtures("empty_plots")
 def test_what_a_user_named_is_escaped(found) -> None:
     name = '<script>alert("&")</script>'
     pair = DroppedPair(77, Fault.MOVED, f"moved {name}")
@@ -140,12 +142,14 @@ def test_what_a_user_named_is_escaped(found) -> None:
     assert f"pair 77 moved {name}" in words
 
 
+@pytest.mark.usefixtures("empty_plots")
 def test_a_recorded_rig_says_when_it_ends(found) -> None:
     day = {"made_on": date(2026, 3, 1), "expires_on": date(2026, 8, 28)}
     words = " ".join(Reader(make_page(judged(found, **day), Limits())).words)
     assert "made on 2026-03-01 expires on 2026-08-28" in words
 
 
+@pytest.mark.usefixtures("empty_plots")
 def test_a_rig_without_a_common_volume_has_a_report_too(found) -> None:
     nothing = replace(
         judged(found, is_accepted=False, reasons=("no part",)),

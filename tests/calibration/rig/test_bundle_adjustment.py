@@ -11,6 +11,7 @@ from tests.calibration.marks import BOARD, HEIGHT, WIDTH, drawn_pose, drawn_rig,
 N_DRAWS = 50
 
 
+@pytest.mark.release
 def test_the_covariance_is_that_of_answers_to_other_noise() -> None:
     rng = np.random.default_rng(15)
     true = drawn_rig(rng)

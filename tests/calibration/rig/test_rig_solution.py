@@ -64,6 +64,7 @@ def test_the_rig_is_found_and_accepted(world, solved):
     assert solved.held_out_rms_px == pytest.approx(solved.solved.rms_px, rel=0.1)
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("n_rigs", few_of([2, 4]))
 def test_the_predicted_error_holds_over_many_rigs(n_rigs):
     errors, bounds = [], []
@@ -78,6 +79,7 @@ def test_the_predicted_error_holds_over_many_rigs(n_rigs):
     assert np.median(np.concatenate(bounds)) < 4.0 * np.median(np.concatenate(errors))
 
 
+@pytest.mark.release
 def test_a_board_that_is_not_flat_is_solved_for():
     rng = np.random.default_rng(8)
     true = drawn_rig(rng)
@@ -109,6 +111,7 @@ def test_too_few_views_are_refused(world):
             solve_rig(BOARD, world[1][:n], SIZE)
 
 
+@pytest.mark.release
 def test_frontal_views_are_refused(world):
     """At the picture's edges, where the line of sight meets the board aslant."""
     rng = np.random.default_rng(2)
@@ -119,6 +122,7 @@ def test_frontal_views_are_refused(world):
     assert any("frontally" in reason for reason in reasons_of(pairs)[1])
 
 
+@pytest.mark.release
 def test_a_board_that_stays_in_the_middle_is_refused(world):
     rng = np.random.default_rng(3)
     small = parse_board(
@@ -142,6 +146,7 @@ def test_a_board_that_stays_in_the_middle_is_refused(world):
         assert not (found.covered.bare[number] & marked).any()
 
 
+@pytest.mark.release
 def test_a_wrong_square_is_seen_by_a_known_distance(world):
     true, pairs = world
     wrong = replace(BOARD, spacing_mm=14.0, mark_mm=10.0)
@@ -155,6 +160,7 @@ def test_swapped_cameras_are_refused(world):
     assert any("swapped" in reason for reason in reasons_of(swapped)[1])
 
 
+@pytest.mark.release
 def test_pairs_out_of_order_are_refused_by_their_number(world):
     pairs = list(world[1])
     pairs[3], pairs[7] = (

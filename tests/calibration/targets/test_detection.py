@@ -62,7 +62,7 @@ def test_every_mark_is_found_to_a_fiftieth_of_a_pixel(name, turn):
     assert np.abs(off_px.mean(axis=0)).max() < 0.01
 
 
-@pytest.mark.parametrize("name", ["charuco", "circles"])
+@pytest.mark.parametrize("name", few_of(["charuco", "circles"]))
 def test_standard_errors_are_those_of_the_noise(name):
     ratios = []
     for seed in range(4):

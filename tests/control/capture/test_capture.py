@@ -109,6 +109,7 @@ def test_it_is_enough_with_the_pairs_that_were_asked_for(room):
     assert followed(capture, lambda s: s.is_enough).n_kept == 5
 
 
+@pytest.mark.release
 def test_a_pair_that_does_not_fit_is_named_and_left_out(room):
     capture = capture_in(room, stop_mm=0.01)
     followed(capture, lambda s: s.n_kept == 8)
@@ -146,6 +147,7 @@ def test_finish_solves_with_what_is_kept_and_tells(room):
     assert snapshot.outcome == Outcome(True, ("well",))
 
 
+@pytest.mark.release
 def test_a_rig_that_is_refused_asks_for_more_pairs(room):
     def solve(pairs, report):
         raise ResultError("no rig explains these views", remedy="look at the pictures")

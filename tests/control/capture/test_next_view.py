@@ -36,6 +36,7 @@ def test_before_there_is_a_rig_the_starting_views_are_asked_for():
         )
 
 
+@pytest.mark.release
 def test_a_wished_view_is_worth_more_than_another_one():
     rng = np.random.default_rng(7)
     rig = drawn_rig(rng)
@@ -56,6 +57,7 @@ def replaced(pair):
     return type(pair)(8, pair.left, pair.right)
 
 
+@pytest.mark.release
 def test_going_on_from_the_last_solve_and_beginning_anew_agree():
     rng = np.random.default_rng(9)
     pairs = drawn_pairs(drawn_rig(rng), rng, 10)

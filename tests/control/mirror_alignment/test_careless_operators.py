@@ -10,7 +10,7 @@ from tests.many import few_of
 
 
 @pytest.mark.parametrize("seed", few_of(range(1, 7)))
-@pytest.mark.parametrize("move", TOKEN_MOVES)
+@pytest.mark.parametrize("move", few_of(TOKEN_MOVES))
 def test_a_refused_calibration_is_not_accepted_by_confirming_predictions(move, seed):
     ended = confirm_blindly(seed, 12, TOKEN_MOVES[move])
     assert not ended.is_false, ended

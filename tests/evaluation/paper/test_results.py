@@ -20,12 +20,12 @@ OURS = followed(
 THEIRS = followed(score(9.0, "LOST", claimed_mm=CLAIMED), score(9.0))
 
 
-@pytest.fixture
-def written(tmp_path):
+@pytest.fixture(scope="module")
+def written(tmp_path_factory):
     """A folder of two tests in two situations, and what a program gets of it."""
     cases = (Case("man", "opening", "overlay"), Case("man", "opening", "patient"))
     settings = TableSettings(cases, ("icp", "bimcc"), 1, 2, 7)
-    folder = CampaignFolder(tmp_path / "out", settings)
+    folder = CampaignFolder(tmp_path_factory.mktemp("results") / "out", settings)
     for test in settings.tests:
         methods = {"icp": THEIRS.to_json(), "bimcc": OURS.to_json()}
         content = json.dumps({"methods": methods})

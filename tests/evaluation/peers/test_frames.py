@@ -66,6 +66,7 @@ def test_without_a_start_no_frame_has_a_pose(sequence) -> None:
     ]
 
 
+@pytest.mark.release
 def test_a_test_is_followed_again_only_when_a_peer_is_missing(
     tmp_path, monkeypatch, capsys
 ) -> None:

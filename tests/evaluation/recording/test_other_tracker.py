@@ -33,6 +33,7 @@ def errors_mm(solved: SolvedFrames, data: TrackedTwice) -> list[float]:
     ]
 
 
+@pytest.mark.release
 def test_frames_and_offset_without_noise() -> None:
     data = track_twice(noise=0.0)
     solved = solve(data)
@@ -55,6 +56,7 @@ def test_frames_and_offset_with_noise() -> None:
     assert 0.05 < solved.offset_sd_ms < 2.0
 
 
+@pytest.mark.release
 def test_what_the_solve_says_of_its_uncertainty_is_what_it_scatters_by() -> None:
     offs, told = [], []
     for seed in range(6):
@@ -105,6 +107,7 @@ def test_a_wrong_pose_here_and_there_does_not_turn_the_frames() -> None:
     assert np.mean(errors_mm(solved, data)) < 0.3
 
 
+@pytest.mark.release
 def test_what_the_tracker_did_not_see_is_not_scored() -> None:
     data = track_twice(seconds=30.0)
     since_s = (data.truth.times_ns - OFFSET_NS - data.times_ns[0]) * 1e-9
@@ -133,6 +136,7 @@ def test_what_determines_nothing_is_refused(data, words) -> None:
     assert "turned to and fro" in error.value.remedy
 
 
+@pytest.mark.release
 def test_a_tracker_of_another_recording_is_refused() -> None:
     data = track_twice()
     other = track_twice(lambda s: waving(2.3 * s + 100.0))

@@ -29,6 +29,8 @@ from tests.evaluation.scored import score
 from tests.evaluation.tracked_twice import CENTRE_MM, track_twice
 from tests.geometry.shapes import sphere
 
+pytestmark = pytest.mark.usefixtures("empty_plots")
+
 RIG, PLAN = a_rig(), a_plan()
 NOT_STATED = OwnError()
 

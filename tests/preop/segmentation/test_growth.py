@@ -10,6 +10,7 @@ from navapp.preop.segmentation.growth import _put_bone, _up_to_plates, grow
 from navapp.preop.segmentation.masks import label_components
 from navapp.preop.segmentation.plates import find_plates
 from navapp.preop.segmentation.solids import find_solids
+from tests.many import few_of
 from tests.preop.ct_phantoms import (
     MARROW_HU,
     SOFT_HU,
@@ -73,7 +74,7 @@ def boxes(points, gap_mm):
     return hu, [in_box(points, *size) for size in sizes]
 
 
-@pytest.mark.parametrize("threshold_hu", [150.0, 200.0, 350.0])
+@pytest.mark.parametrize("threshold_hu", few_of([150.0, 200.0, 350.0]))
 @pytest.mark.parametrize(
     ("shapes", "size"), [(balls, (68, 74, 88)), (boxes, (60, 54, 58))], ids=["balls", "boxes"]
 )
@@ -84,6 +85,7 @@ def test_two_bones_a_millimetre_apart_come_apart(shapes, size, threshold_hu):
     assert_bones_are(parted(hu, 2, threshold_hu), depths_mm)
 
 
+@pytest.mark.release
 def test_a_spur_that_leans_over_the_other_bone_stays_its_own():
     size = (76, 60, 64)
     points = points_of(size, lattice(size, SPACING_MM))
@@ -104,7 +106,7 @@ def test_a_spur_that_leans_over_the_other_bone_stays_its_own():
     assert len(np.unique(of_spur)) == 1
 
 
-@pytest.mark.parametrize("n_bones", [3, 4])
+@pytest.mark.parametrize("n_bones", few_of([3, 4]))
 def test_three_and_four_bones_of_one_component(n_bones):
     size = (92, 62, 62)
     points = points_of(size, lattice(size, SPACING_MM))

@@ -53,6 +53,7 @@ class Asked:
         self.frames.append(frame)
 
 
+@pytest.mark.release
 def test_the_best_answer_comes_first_and_a_sure_one_ends_the_search() -> None:
     a, asked = room(), Asked()
     frame = a.frames[0]
