@@ -65,9 +65,10 @@ checked-kernels: setup bytecode
 	@rm -rf $(filter-out $(CHECKED_CACHE),$(wildcard $(VENV)/numba-boundscheck*))
 	$(CHECKED) -m kernel $(KERNEL_FILES)
 
-# With +, line by line as they come. More workers than cores: one runs the tests that wait.
+# With +, line by line as they come. More workers than cores: one runs the tests that wait. Those of
+# kernels run with checked indices, and without the check before a release.
 tests: check bytecode
-	+$(PYTEST) -n 3 --dist loadgroup
+	+$(PYTEST) -n 3 --dist loadgroup -m 'not kernel'
 
 check: setup    ## style, types, import rules
 	$(BIN)/ruff format --check .

@@ -10,13 +10,13 @@ import pytest
 from navapp.cli.main import run
 from tests.many import few_of
 
-OPERATION = Path(__file__).parents[2] / "docs" / "operation.toml"
+OPERATION = (Path(__file__).parents[2] / "docs" / "operation.toml").read_text(encoding="utf-8")
 QUIT = "[[step]]\ndo = 'quit'\n"
 REGISTER = "[[step]]\ndo = 'register'\n"
 STARTS = [(stage, seed) for seed in range(1, 6) for stage in ("implant", "patella", "spacer")]
 STEPS = {
     "femoral_guide", "femur_distal", "femur_anterior", "femur_chamfer_anterior",
-    "femur_posterior", "femur_chamfer_posterior", "femoral_implant", "patella_posterior",
+    "femur_posterior", "femur_chamfer_posterior", "femoral_implant", "patella",
     "patellar_implant", "tibia_proximal", "spacer",
 }  # fmt: skip
 MEASURED = {"femoral_guide", "femur_distal", "tibia_proximal"}
@@ -44,19 +44,18 @@ def test_a_stage_to_start_in_is_known_with_the_cuts_that_were_made(start, tmp_pa
     assert np.median([frame["tre_mm"] for frame in frames[1:]]) <= WORST_MM
 
 
-# Where the script is ended, which stage is the last one then, and what has been made by then.
-INTO_IMPLANT = ("\n# 3 implant", 3, {"femoral_guide"})
-TO_ITS_END = ("\n# there is no sixth", 5, {*STEPS})
+# A script, how many stages it goes through, and what it makes.
+INTO_IMPLANT = (OPERATION.partition("# 3 implant")[0] + QUIT, 3, {"femoral_guide"})
+TO_ITS_END = (OPERATION, 5, STEPS)
 
 
 @pytest.mark.parametrize("part", few_of([INTO_IMPLANT, TO_ITS_END]), ids=["implant", "end"])
 def test_an_operation_goes_through_its_stages(part, tmp_path) -> None:
     """Every gate is refused once and met once (the script expects it); all that is made is told."""
-    next_part, n_stages, made = part
+    text, n_stages, made = part
     config, script, result = (tmp_path / name for name in ("c.toml", "script.toml", "r.json"))
     config.write_text("[camera.simulated]\nmisses = 0.2\n", encoding="utf-8")
-    whole = OPERATION.read_text(encoding="utf-8")
-    script.write_text(whole.partition(next_part)[0] + QUIT, encoding="utf-8")
+    script.write_text(text, encoding="utf-8")
     arguments = ["--config", str(config), "run", "--headless", "--json", str(result)]
     assert run([*arguments, "--operator", str(script), "--frames", "300"]) == 0
     told = json.loads(result.read_text(encoding="utf-8"))
