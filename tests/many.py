@@ -7,8 +7,13 @@ import pytest
 
 
 def few_of(cases: Iterable[Any], n: int = 1) -> list[Any]:
-    """Parameters; those after the first `n` are run with --release only."""
+    """Values of one parameter; those after the first `n` are run with --release only."""
+    return few_rows_of(((case,) for case in cases), n)
+
+
+def few_rows_of(rows: Iterable[tuple[Any, ...]], n: int = 1) -> list[Any]:
+    """The same of several parameters, of which each row holds a value."""
     return [
-        case if number < n else pytest.param(case, marks=pytest.mark.release)
-        for number, case in enumerate(cases)
+        pytest.param(*row, marks=[pytest.mark.release] if number >= n else [])
+        for number, row in enumerate(rows)
     ]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.many import few_of
+from tests.many import few_rows_of
 
 ROOT = Path(__file__).resolve().parent.parent
 HEAVY = (
@@ -102,7 +102,7 @@ BREACHES = [
 ]
 
 
-@pytest.mark.parametrize(("path", "breach", "contract"), few_of(BREACHES, 3))
+@pytest.mark.parametrize(("path", "breach", "contract"), few_rows_of(BREACHES, 3))
 def test_a_deliberate_breach_is_found(
     checkout: Path, path: str, breach: str, contract: str
 ) -> None:

@@ -23,7 +23,7 @@ from tests.drivers.footprints import (
     footprint,
     needs_descriptors,
 )
-from tests.many import few_of
+from tests.many import few_rows_of
 
 pytestmark = pytest.mark.waits
 
@@ -204,7 +204,7 @@ def test_a_packet_without_end_is_refused_and_forgotten(line, peer) -> None:
 
 
 @pytest.mark.parametrize(
-    ("n_bytes", "pause_s"), few_of([(1000, 0.0), (1, 0.005)]), ids=["fast", "slow"]
+    ("n_bytes", "pause_s"), few_rows_of([(1000, 0.0), (1, 0.005)]), ids=["fast", "slow"]
 )
 def test_a_line_that_never_stops_is_refused_soon(line, peer, n_bytes, pause_s, monkeypatch) -> None:
     # Longer than a busy computer keeps the sender waiting.

@@ -12,7 +12,7 @@ from navapp.registration.bimcc import solution_at
 from navapp.registration.multi_start import ScoredPose
 from navapp.registration.register import measure_smooth_part_mm
 from navapp.values import BoneModel, Reason
-from tests.many import few_of
+from tests.many import few_of, few_rows_of
 from tests.registration.shapes import (
     TRUE,
     ball_mesh,
@@ -279,7 +279,7 @@ def surface_scene(bone: BoneModel, *, has_camera: bool) -> tuple[Scene, RigidTra
 @pytest.mark.parametrize("has_camera", few_of([True, False]))
 @pytest.mark.parametrize(
     ("name", "mesh", "n_turns", "n_shifts"),
-    few_of(
+    few_rows_of(
         [
             ("sphere", ball_mesh(30.0, 2500), 3, 0),
             ("plane", grid_mesh(lambda x, y: 0.0 * x), 1, 2),

@@ -14,7 +14,7 @@ from sim_devices.rigs import make_default_rig
 from sim_devices.sensor import SensorModel
 from sim_devices.sheet import PrintedSheet, SheetInView, SheetScene
 from sim_devices.sheet_kernels import draw_sheet
-from tests.many import few_of
+from tests.many import few_rows_of
 from tests.reference.sheet_reference import sheet_reference
 
 BOARD = parse_board(
@@ -66,7 +66,7 @@ def held(distance_mm: float, turn_rad: tuple[float, float, float]) -> RigidTrans
 @pytest.mark.parametrize("eye", ["left", "right"])
 @pytest.mark.parametrize(
     ("distance_mm", "turn_rad"),
-    few_of([(450.0, (0.0, 0.0, 0.05)), (360.0, (0.5, 0.2, -0.2)), (510.0, (-0.3, -0.4, 1.5))]),
+    few_rows_of([(450.0, (0.0, 0.0, 0.05)), (360.0, (0.5, 0.2, -0.2)), (510.0, (-0.3, -0.4, 1.5))]),
 )
 def test_every_corner_is_where_the_optics_put_it(eye, distance_mm, turn_rad):
     pose = held(distance_mm, turn_rad)

@@ -16,7 +16,7 @@ from navapp.tracking.judging import PoseJudge
 from navapp.tracking.search.near import NearSearch
 from navapp.tracking.surface_meter import WIDE_BOX
 from navapp.values import FrameTimings, Prior, Reason, Status, Stopwatch, TrackedFrame, Verdict
-from tests.many import few_of
+from tests.many import few_of, few_rows_of
 from tests.tracking.meters import Listening
 from tests.tracking.rooms import GOAL, Room, room
 
@@ -198,7 +198,8 @@ def test_a_frame_that_is_tracked_asks_for_all_that_a_glance_does_not() -> None:
 
 
 @pytest.mark.parametrize(
-    ("n_lost", "searches"), few_of([(1, [3, 0]), (2, [3, 0]), (3, []), (4, [3, 0]), (5, [])], 2)
+    ("n_lost", "searches"),
+    few_rows_of([(1, [3, 0]), (2, [3, 0]), (3, []), (4, [3, 0]), (5, [])], 2),
 )
 def test_a_lost_bone_is_looked_for_in_every_frame_and_searched_in_some(
     n_lost: int, searches: list[int]

@@ -11,7 +11,7 @@ from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.tracking.first_registration import FirstRegistration
 from navapp.tracking.frame import Fit, Frame
 from navapp.values import Reason, Status, Stopwatch, TrackedFrame
-from tests.many import few_of
+from tests.many import few_rows_of
 from tests.tracking.rooms import GOAL, room
 
 
@@ -73,7 +73,9 @@ def test_what_surely_saw_another_size_is_not_overturned_by_a_second_look() -> No
 
 @pytest.mark.parametrize(
     ("said_before", "is_found"),
-    few_of([(Reason.COVERAGE_LOW, True), (Reason.AMBIGUOUS, False), (Reason.SIZE_DIFFERS, False)]),
+    few_rows_of(
+        [(Reason.COVERAGE_LOW, True), (Reason.AMBIGUOUS, False), (Reason.SIZE_DIFFERS, False)]
+    ),
 )
 def test_what_the_search_for_a_buried_bone_finds_is_looked_at_again(
     said_before: Reason, is_found: bool, monkeypatch: pytest.MonkeyPatch

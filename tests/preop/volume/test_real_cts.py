@@ -7,7 +7,7 @@ from navapp.errors import InputError
 from navapp.geometry.ply import read_ply
 from navapp.preop.volume import read_ct, read_labels
 from navapp.preop.volume.dicom_series import read_series
-from tests.many import few_of
+from tests.many import few_rows_of
 
 pytestmark = pytest.mark.data
 
@@ -24,7 +24,9 @@ def test_totalseg_positions_win_and_slices_are_sorted(data):
     assert any("2 mm apart, the thickness tag says 3 mm" in said for said in ct.warnings)
 
 
-@pytest.mark.parametrize(("label", "share", "mean_hu"), few_of([(69, 0.76, 682), (70, 0.755, 580)]))
+@pytest.mark.parametrize(
+    ("label", "share", "mean_hu"), few_rows_of([(69, 0.76, 682), (70, 0.755, 580)])
+)
 def test_dicom_and_nifti_meet_in_physical_space(data, label, share, mean_hu):
     ct = read_ct(data / "ct/totalseg_example/dicom").volume
     mask = read_labels(data / "ct/totalseg_example/example_seg_dicom.nii.gz")
