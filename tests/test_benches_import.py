@@ -22,6 +22,7 @@ def test_a_bench_imports(name: str) -> None:
         pytest.skip(f"{error.name} is a peer")
 
 
+@pytest.mark.release
 def test_the_bench_of_faces_counts_them(capsys, monkeypatch) -> None:
     """Its scene stands for the simulator's: whoever changes how those are rendered is told here."""
     monkeypatch.setattr("sys.argv", ["tool_faces", "--frames", "2"])

@@ -14,6 +14,7 @@ from tests import kept
 SPEC = KneeSpec(3, "left", "male", "old")
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("is_there", [False, True])
 def test_a_kept_knee_is_the_simulators(tmp_path, monkeypatch, is_there: bool) -> None:
     monkeypatch.setattr(kept, "FOLDER", tmp_path)

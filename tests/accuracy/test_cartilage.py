@@ -60,6 +60,7 @@ def test_cartilage_that_is_known_exactly_costs_nothing(seed: int) -> None:
         assert error_mm <= 0.2
 
 
+@pytest.mark.release
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_thickness_map_that_is_0_4_mm_off_costs_at_most_0_6_mm(seed: int) -> None:

@@ -86,6 +86,7 @@ def solved(views: Photographed) -> Path:
     return place / "display.yml"
 
 
+@pytest.mark.release
 def test_the_file_draws_where_the_eye_sees(solved: Path, views: Photographed) -> None:
     model = read_display_model(solved)
     points = views.site_mm + np.random.default_rng(1).uniform(-30.0, 30.0, (40, 3))

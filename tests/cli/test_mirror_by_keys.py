@@ -183,6 +183,7 @@ def test_an_interruption_keeps_the_alignments_and_touches_no_display(
     assert not list(tmp_path.glob("*.unfinished.json"))
 
 
+@pytest.mark.release
 @pytest.mark.slow
 def test_json_on_the_standard_output_is_nothing_but_json(
     board: str, tmp_path: Path, capsys

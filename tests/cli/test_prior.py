@@ -59,6 +59,7 @@ def test_three_landmarks_make_a_prior_that_finds_the_bone(files, tmp_path) -> No
     assert out.read_bytes() == before
 
 
+@pytest.mark.release
 def test_a_box_where_no_bone_is_makes_a_file_and_says_so(files, tmp_path, capsys) -> None:
     out = tmp_path / "prior.json"
     assert make(files, out, "--box", "5,5,90,90") == 4

@@ -149,6 +149,7 @@ def test_an_unplugged_camera_that_comes_back_is_navigated_on(undo) -> None:
     assert room.display.visible_image().any()
 
 
+@pytest.mark.release
 @pytest.mark.slow
 def test_a_blackout_suspends_and_light_resumes(undo) -> None:
     faults = FaultScript((Fault(FaultKind.BLACKOUT_RIGHT, 0.25, 0.2),))

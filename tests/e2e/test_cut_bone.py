@@ -85,6 +85,7 @@ def assert_measured(data: Path, measured: dict[str, Any]) -> None:
         assert 0.25 <= face["seen_share"] <= 1.0
 
 
+@pytest.mark.release
 def test_a_cut_bone_is_followed_and_its_faces_are_measured(
     data: Path, plan: Path, tmp_path: Path
 ) -> None:

@@ -86,6 +86,7 @@ def test_most_frames_of_a_recorded_operation_get_a_pose(
     assert len(list(overlay.glob("overlay_*.jpg"))) == len(frames)
 
 
+@pytest.mark.release
 @pytest.mark.data
 @pytest.mark.slow
 @pytest.mark.parametrize("method", few_of(["paper", "icp"]))

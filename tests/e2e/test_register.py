@@ -182,6 +182,7 @@ def test_metres_and_millimetres_give_the_same(bone: Bone, more: list[str]) -> No
     np.testing.assert_allclose(scaled, in_mm["covariance"], rtol=1e-4, atol=1e-12)
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("scale", few_of([700.0, 1e-4, 1.0]))
 def test_without_a_unit_any_size_is_found(bone: Bone, scale: float) -> None:
     bone.write(scale, "none")
@@ -277,6 +278,7 @@ def test_the_papers_methods_answer_too(bone: Bone, method: str) -> None:
     assert bone.tre(found["scene_from_model"]) < 1.0
 
 
+@pytest.mark.release
 def test_the_aligned_model_lies_in_the_scene(bone: Bone) -> None:
     bone.write(1e-3, "m")
     out = bone.folder / "aligned.ply"
@@ -379,6 +381,7 @@ def test_a_ball_turns_and_is_no_registration(tmp_path: Path, method: str) -> Non
     assert found["reasons"]
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("larger", few_of(["scene", "model"]))
 @pytest.mark.parametrize("units", few_of(["mm", "m", "none"]))
 def test_files_of_different_units_are_noticed(bone: Bone, larger: str, units: str, capsys) -> None:

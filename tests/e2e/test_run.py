@@ -255,6 +255,7 @@ def boxed(tmp_path_factory: pytest.TempPathFactory, moving: Path) -> Path:
     return folder
 
 
+@pytest.mark.release
 @pytest.mark.slow
 def test_a_drawn_box_is_all_that_a_registration_needs(boxed: Path) -> None:
     frames = result(boxed / "a.json")["frames"]
@@ -403,6 +404,7 @@ def boarded(folder: Path, more: str = "") -> list[str]:
     return [*options, "--operator", str(folder / "idle.toml")]
 
 
+@pytest.mark.release
 @pytest.mark.slow
 def test_a_board_in_view_checks_the_rig(tmp_path: Path) -> None:
     out = tmp_path / "out.json"

@@ -48,6 +48,7 @@ class ScreenCamera:
         return picture, (before_ns + self._clock.now_ns()) // 2
 
 
+@pytest.mark.release
 @pytest.mark.slow
 def test_a_window_is_seen_some_milliseconds_after_the_call(monkeypatch) -> None:
     clock = SystemClock()

@@ -118,6 +118,7 @@ def test_what_is_hardly_a_surface_has_no_caps(points) -> None:
     assert not on_flat_caps(TriangleMesh(points, faces)).any()
 
 
+@pytest.mark.release
 def test_the_joints_surfaces_of_simulated_bones_are_no_caps(people) -> None:
     """Some of their patellae have facets as flat as a cut."""
     for knee in people:

@@ -94,6 +94,7 @@ def test_real_right_bones_are_never_called_left(name) -> None:
     assert mirrored.side in ("left", None)
 
 
+@pytest.mark.release
 @pytest.mark.data
 @pytest.mark.parametrize("step_deg", few_of([60, 15]))
 def test_a_whole_real_knee_is_certain(step_deg: int) -> None:

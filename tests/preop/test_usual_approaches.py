@@ -6,6 +6,7 @@ from sim_devices.scenario import Scenario
 from sim_devices.world import World
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("side", ["left", "right"])
 @pytest.mark.parametrize("bone", ["femur", "tibia", "patella"])
 def test_the_simulated_cameras_stand_well_inside_the_usual_cone(bone: str, side: str) -> None:

@@ -105,6 +105,7 @@ def test_the_search_everywhere_brings_a_distant_model_to_the_scene() -> None:
     assert mean_error_mm(found.estimate.camera_from_bone, BONE) < 0.25
 
 
+@pytest.mark.release
 def test_what_is_seen_in_part_is_tried_from_other_starts_too() -> None:
     """An answer that fits is doubtful while little of the model, or nobody knows what, was seen."""
     points, start = seen_scene(900, 0.3).points_mm, disturbed(MODEL, 4.0, 3.0, 1)
@@ -225,6 +226,7 @@ def test_a_fit_that_runs_out_of_steps_is_no_registration(monkeypatch: pytest.Mon
     assert found.reasons == (Reason.NOT_CONVERGED,)
 
 
+@pytest.mark.release
 def test_a_shape_that_fits_in_two_poses_is_a_guess() -> None:
     """Half a turn maps an ellipsoid onto itself; a quarter of one leads to either."""
     axes = (22.0, 30.0, 45.0)
@@ -258,6 +260,7 @@ def test_a_shape_that_repeats_itself_every_45_degrees_is_a_guess(seed: int) -> N
     assert Reason.AMBIGUOUS in found.reasons
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("method", few_of(METHODS))
 def test_points_all_over_the_room_are_never_a_registration(method) -> None:
     rng = np.random.default_rng(1)
@@ -448,6 +451,7 @@ def test_what_is_smaller_than_a_kernel_fits_everywhere() -> None:
     assert "the scene is too small to fix a bone" in found.details
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("seed", few_of(range(4)))
 def test_a_scene_that_holds_no_bone_is_no_registration(seed: int) -> None:
     """A noisy sheet lies against a bone's flank well enough: its residuals are no noise."""

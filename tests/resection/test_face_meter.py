@@ -60,6 +60,7 @@ def test_glints_that_each_eye_sees_elsewhere_do_not_move_the_face(meter: FaceMet
     assert 0.2 < off_mm <= face.bound_mm
 
 
+@pytest.mark.release
 def test_clipped_pixels_move_no_face_that_is_told(meter: FaceMeter) -> None:
     for glint in (1.0, 2.0, 4.0):
         left, right = pictures(pose(), glint=glint)

@@ -140,6 +140,7 @@ def take(scenario, shutter_ms=0.0, *, is_blurred=False):
     return world, camera.read(1.0)
 
 
+@pytest.mark.release
 def test_each_row_of_the_leg_is_as_a_picture_of_its_own_time_has_it():
     world, frame = take(DRIFTING, 16.0)
     assert frame.captured_ns == pytest.approx(AT_NS, abs=1)

@@ -21,6 +21,7 @@ def knee():
     return make_knee(KneeSpec(3))
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("bone", BONES)
 @pytest.mark.parametrize("mean_mm", [0.8, 2.2])
 def test_thickness_has_its_mean_on_the_joint_surface_and_is_nowhere_else(knee, bone, mean_mm):

@@ -56,6 +56,7 @@ def test_the_femoral_component_is_where_bone_was_removed(site, fitted) -> None:
     assert all(cut.heights_mm(used).max() < 1e-6 for cut in fitted.rasped)
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("seed", few_of(SEEDS))
 def test_the_insert_sets_the_gap_between_the_components(seed) -> None:
     site = World(Scenario(seed=seed, sex="male" if seed % 2 else "female"))._site

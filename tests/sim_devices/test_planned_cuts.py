@@ -16,6 +16,7 @@ KNEES = [
 ]
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("spec", few_of(KNEES, 2))
 def test_every_cut_takes_off_what_it_should(spec) -> None:
     knee = make_knee(spec)
@@ -36,6 +37,7 @@ def test_every_cut_takes_off_what_it_should(spec) -> None:
     assert RESECTION_MM < removed["tibia_proximal"] < 20.0
 
 
+@pytest.mark.release
 def test_the_anterior_cut_never_notches_the_shaft() -> None:
     for seed in (1, 2, 3):
         knee = make_knee(KneeSpec(seed, sex="male"))

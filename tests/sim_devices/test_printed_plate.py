@@ -96,6 +96,7 @@ def test_ink_that_spreads_moves_every_edge_outwards(
     np.testing.assert_allclose(outwards, outwards.mean(), atol=0.01)
 
 
+@pytest.mark.release
 def test_ink_that_spreads_covers_white_inside_of_markers(monkeypatch: pytest.MonkeyPatch) -> None:
     grey = {
         sign: only("_SPREAD_MM", sign * 0.1, monkeypatch).white.mean() for sign in (1.0, 0.0, -1.0)

@@ -86,6 +86,7 @@ def test_depth_and_coverage_agree_with_ray_casting(femur, pinhole):
     assert ((picture.body == 0) == seen).all()
 
 
+@pytest.mark.release
 def test_a_pattern_of_dots_lands_where_the_distorted_camera_projects_it():
     rig = make_default_rig()
     places = [(x, y, 450.0) for x in (-170.0, -60.0, 70.0, 175.0) for y in (-85.0, 5.0, 90.0)]

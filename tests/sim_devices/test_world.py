@@ -51,6 +51,7 @@ def test_pictures_have_the_size_of_the_scaled_rig():
     assert np.isfinite(small).all()
 
 
+@pytest.mark.release
 def test_a_small_picture_shows_the_same_as_a_large_one():
     large = smooth(world().render("left", 0), 4.0)[::2, ::2]
     small = smooth(world().render("left", 0, 0.5), 2.0)
@@ -103,6 +104,7 @@ def test_what_is_seen_of_the_femur_is_the_anatomy_at_the_true_pose():
         assert np.percentile(error, 99) < 0.02
 
 
+@pytest.mark.release
 def test_the_nominal_start_is_the_book_and_the_truth_is_off_by_the_placement_error():
     for seed in (1, 2, 3):
         true = world(replace(PLAIN, seed=seed)).left_from_body("femur", 0)

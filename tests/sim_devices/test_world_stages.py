@@ -86,6 +86,7 @@ def test_both_cameras_see_the_cut_faces_of_the_stage(scenario, stage) -> None:
             assert share_seen(site, eye, face) > 0.6, (name, eye)
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("scenario", few_of(PATIENTS))
 def test_the_patella_that_is_turned_over_lies_free_and_shows_its_joint_side(scenario) -> None:
     site = world(scenario)
@@ -131,6 +132,7 @@ def test_any_steps_can_be_shown() -> None:
     assert site.states.set_stage("spacer") == enter("spacer").made
 
 
+@pytest.mark.release
 def test_metal_mirrors_the_lamps_and_bone_does_not() -> None:
     site = world()
     site.states.set_stage("implant")

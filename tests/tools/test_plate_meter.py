@@ -57,6 +57,7 @@ def test_a_plate_in_both_pictures_is_found_where_it_is(name: str, meter: PlateMe
     assert found.seen_share > 0.8
 
 
+@pytest.mark.release
 def test_faces_that_are_folded_away_are_measured_too() -> None:
     meter = PlateMeter(FOLDED, RIG)
     shape = shape_of(FOLDED)
@@ -66,6 +67,7 @@ def test_faces_that_are_folded_away_are_measured_too() -> None:
         assert_there(measured(meter, pictures_of(shape, pose)), pose, 0.4, 0.5)
 
 
+@pytest.mark.release
 def test_errors_are_as_large_as_the_covariance_says(meter: PlateMeter) -> None:
     rng = np.random.default_rng(8)
     shape = shape_of(FLAT, seed=5, errors=1.0)

@@ -102,6 +102,7 @@ def test_a_box_beside_the_bone_gives_no_ok(box: tuple[int, int, int, int]) -> No
     assert all(one.verdict.status is not Status.OK for one in found)
 
 
+@pytest.mark.release
 def test_where_no_start_leads_to_a_pose_a_buried_bone_is_looked_for(monkeypatch) -> None:
     monkeypatch.setattr(FitScorer, "find_poses", lambda *_: [])
     a = room()

@@ -35,6 +35,7 @@ def test_a_tracker_is_made_by_the_name_of_its_method() -> None:
     assert type(make_tracker(a.rig, bone, TrackerSettings("paper"))) is PaperTracker
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("kind", few_of([IcpTracker, PaperTracker]))
 def test_one_fit_to_so_many_points_makes_an_answer(kind) -> None:
     """At a glance around the pose, at a first registration with more room."""

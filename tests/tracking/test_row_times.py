@@ -209,6 +209,7 @@ def test_a_bone_whose_motion_is_not_known_is_refused_until_the_next_frame() -> N
     assert tracked.verdict.status is Status.OK
 
 
+@pytest.mark.release
 @pytest.mark.slow
 def test_a_bone_that_is_carried_by_another_one_is_glanced_at_with_its_motion() -> None:
     """As a second bone is, in every fourth frame."""

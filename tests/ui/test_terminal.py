@@ -119,6 +119,7 @@ def test_the_mouse_is_asked_for(tmp_path: Path) -> None:
         screen.close()
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("number", few_of([signal.SIGTERM, signal.SIGHUP]))
 def test_a_signal_ends_it_in_order(tmp_path: Path, number: signal.Signals) -> None:
     screen = Screen(tmp_path, "run")
@@ -148,6 +149,7 @@ def test_a_closed_terminal_stops_the_session(tmp_path: Path, is_told: bool) -> N
         screen.close()
 
 
+@pytest.mark.release
 def test_a_failure_is_one_sentence_and_the_traceback_is_in_the_log(tmp_path: Path) -> None:
     screen = Screen(tmp_path, "break")
     try:

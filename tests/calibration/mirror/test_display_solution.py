@@ -52,6 +52,7 @@ def test_what_is_drawn_appears_where_it_should(seed: int) -> None:
     assert shares[-1] == 1.0
 
 
+@pytest.mark.release
 def test_without_marked_views_the_eye_is_where_the_first_ones_were() -> None:
     _, views, eye = some_views(3)
     unmarked = [dataclasses.replace(view, is_eye=False) for view in views]

@@ -173,6 +173,7 @@ def test_pairs_out_of_order_are_refused_by_their_number(world):
     assert any("pair 3" in reason and "pair 7" in reason for reason in reasons)
 
 
+@pytest.mark.release
 def test_a_blurred_view_is_dropped_and_the_rest_accepted(world):
     pairs = list(world[1])
     right = replace(pairs[5].right, blur_px=3.0)
@@ -193,6 +194,7 @@ def test_a_board_that_moved_between_the_pictures_is_refused(world):
     assert any("pair 99" in reason and "moved" in reason for reason in reasons)
 
 
+@pytest.mark.release
 def test_views_set_aside_judge(world):
     true, pairs = world
     rng = np.random.default_rng(6)

@@ -43,6 +43,7 @@ def test_a_cross_that_was_not_moved_is_not_kept():
     assert steps(session, 2).n_kept == 1
 
 
+@pytest.mark.release
 def test_a_cross_is_lit_beside_what_is_expected_and_each_room_beside_another():
     offsets = []
     for seed in (1, 2):

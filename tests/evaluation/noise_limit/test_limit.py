@@ -99,6 +99,7 @@ def test_disparities_move_with_the_pose_as_the_slopes_say(scene, axis) -> None:
     assert np.median(np.abs(moved - told)) < 0.02 * np.sqrt(np.mean(told**2))
 
 
+@pytest.mark.release
 def test_an_ideal_estimator_reaches_the_bound(scene) -> None:
     """Of 120 draws of the noise the errors have the covariance that the bound says."""
     rng, normed, squares, limits = np.random.default_rng(7), [], [], []

@@ -42,6 +42,7 @@ def lost(rig, surface, frame, pose):
     return lambda frame: None
 
 
+@pytest.mark.release
 def test_a_peer_is_scored_against_the_truth_in_all_frames_but_the_first(sequence) -> None:
     frames = score(sequence, start_at(sequence, 0), resting)
     assert [frame.index for frame in frames] == [1, 2, 3, 4]

@@ -45,6 +45,7 @@ def test_frames_and_offset_without_noise() -> None:
     assert max(errors_mm(solved, data)) < 0.02
 
 
+@pytest.mark.release
 def test_frames_and_offset_with_noise() -> None:
     data = track_twice(seconds=40.0)
     solved = solve(data)
@@ -66,6 +67,7 @@ def test_what_the_solve_says_of_its_uncertainty_is_what_it_scatters_by() -> None
     assert 0.3 < np.sqrt(np.mean(np.square(offs))) / np.mean(told) < 3.0
 
 
+@pytest.mark.release
 def test_no_picture_is_both_solved_with_and_scored() -> None:
     data = track_twice()
     solved = solve(data)

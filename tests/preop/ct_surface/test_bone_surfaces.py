@@ -139,6 +139,7 @@ def test_the_working_model_is_near_the_fine_one(scan, monkeypatch):
     assert coarse.is_measured.mean() > 0.95
 
 
+@pytest.mark.release
 def test_a_shaft_that_padding_cuts_is_cut_there(straight):
     """As in a CT that was resampled to other axes: its last slice leans in the volume."""
     ct, _ = straight

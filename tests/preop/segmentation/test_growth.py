@@ -121,6 +121,7 @@ def test_three_and_four_bones_of_one_component(n_bones):
     assert_bones_are(parted(hu, n_bones), [in_box(points, *edges) for edges in edges_mm])
 
 
+@pytest.mark.release
 def test_a_shaft_that_the_volume_cuts_keeps_its_marrow():
     size = (60, 60, 30)
     points = points_of(size, lattice(size, SPACING_MM))
@@ -143,6 +144,7 @@ def test_the_first_slice_is_no_neighbour_of_the_last():
     np.testing.assert_array_equal(grown[-1], grown[-4])
 
 
+@pytest.mark.release
 def test_a_vessel_through_both_plates_leads_no_bone_into_the_other():
     size = (60, 54, 58)
     points = points_of(size, lattice(size, SPACING_MM))

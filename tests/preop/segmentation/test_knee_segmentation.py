@@ -170,6 +170,7 @@ def test_a_side_is_a_side_however_the_voxels_are_ordered():
         assert any("cut off" in said for said in segment(turned).warnings) == is_cut
 
 
+@pytest.mark.release
 def test_a_shaft_cut_by_the_first_or_last_slice_is_no_warning():
     ct = ct_of_bones([KNEE_MM["femur"], KNEE_MM["tibia"]], (64, 64, 66))
     segmentation = segment(ct)

@@ -25,7 +25,7 @@ def fade(picture: np.ndarray, saturation: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize("saturation", few_of([1.0, 0.6, 0.35, 0.25, 0.15]))
-@pytest.mark.parametrize("size", [0.985, 1.015])
+@pytest.mark.parametrize("size", few_of([0.985, 1.015]))
 def test_a_model_of_another_size_stays_in_doubt(size: float, saturation: float) -> None:
     a = room()
     frame, bone = a.frames[1], a.tracker.model.bone
