@@ -19,7 +19,11 @@ CHECKED := NUMBA_BOUNDSCHECK=1 NUMBA_OPT=1 \
     NUMBA_CACHE_DIR=$(CHECKED_CACHE) \
     $(PYTEST) -q -n 1 --timeout 900 --every-kernel
 # Every kernel is run by one of them at least: --every-kernel sees to it.
-KERNEL_FILES = $(shell grep -rl --include='test_*.py' 'mark\.kernel' tests)
+KERNEL_FILES = $(shell grep -rl --include='test_*.py' 'mark\.kernel' tests | sort)
+# What last passed with the check: kernels, those who call them, their tests, and what compiles them.
+CHECKED_RECORD := tests/kernels.checked
+CALLERS = $(shell grep -rlE --include='*.py' 'kernels import' navapp sim_devices drivers calibration | sort)
+CHECKED_SUM = $(shell cat $(KERNELS) $(CALLERS) $(KERNEL_FILES) constraints.txt | cksum | cut -d' ' -f1)
 KERNEL_TESTS := tests/geometry/test_zbuffer.py tests/geometry/test_masks.py \
     tests/registration --ignore tests/registration/test_register.py \
     tests/sim_devices/test_raster_kernels.py tests/sim_devices/test_shading_kernels.py tests/sim_devices/test_renderer.py \
@@ -34,7 +38,7 @@ SYSTEM_DEPS := python3-venv libgl1 libegl1 libgomp1 libusb-1.0-0 tmux \
     xvfb xserver-xorg-core xserver-xorg-video-dummy x11-xserver-utils \
     libxcb-randr0 libxcb-render0 libxcb-shm0 libxcb-xfixes0
 
-.PHONY: run tutorial window test test-all check setup bench peers peers-visp bench-peers system-deps clean help
+.PHONY: run tutorial window test test-all checked-kernels check setup bench peers peers-visp bench-peers system-deps clean help
 
 help:           ## this list
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed 's/:.*##/\t/'
@@ -50,25 +54,30 @@ window: setup   ## the application, with its picture in a window of the desktop
 	@$(BIN)/navapp run --window
 
 test: setup  ## style, types, import rules and the tests: some minutes
-	@$(MAKE) --no-print-directory -j2 --output-sync=line check bytecode checked-kernels tests
+	@$(MAKE) --no-print-directory -j2 --output-sync=line check bytecode changed-kernels tests
 
 test-all: setup check bytecode  ## the release gate: as test, with every case of every test
 	$(PYTEST) -n 4 --dist loadgroup --release
 	$(CHECKED) --release $(KERNEL_TESTS) $(KERNEL_FILES)
 
-.PHONY: bytecode checked-kernels tests
+.PHONY: bytecode changed-kernels tests
 bytecode: setup
 	@$(PYTEST) -q --collect-only --release >/dev/null
 
-# Neither core is idle for long: what compiles runs beside types, and then beside the tests.
-checked-kernels: setup bytecode
+checked-kernels: setup bytecode  ## kernels with checked indices; remembers, for make test, that they passed
 	@rm -rf $(filter-out $(CHECKED_CACHE),$(wildcard $(VENV)/numba-boundscheck*))
 	$(CHECKED) -m kernel $(KERNEL_FILES)
+	@echo $(CHECKED_SUM) > $(CHECKED_RECORD)
 
-# With +, line by line as they come. More workers than cores: one runs the tests that wait. Those of
-# kernels run with checked indices, and without the check before a release.
+# Minutes of compiling, beside the tests, unless the same kernels have passed before.
+changed-kernels: setup bytecode
+	@if test "$$(cat $(CHECKED_RECORD))" = $(CHECKED_SUM); then \
+	    echo "kernels: as they last passed with checked indices"; \
+	else $(MAKE) checked-kernels; fi
+
+# With +, line by line as they come. More workers than cores: one runs the tests that wait.
 tests: check bytecode
-	+$(PYTEST) -n 3 --dist loadgroup -m 'not kernel'
+	+$(PYTEST) -n 3 --dist loadgroup
 
 check: setup    ## style, types, import rules
 	$(BIN)/ruff format --check .

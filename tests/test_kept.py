@@ -71,6 +71,7 @@ def test_other_arguments_are_other_things(tmp_path, monkeypatch) -> None:
         kept.make_tissue([femur], [femur], np.arange(3))
 
 
+@pytest.mark.release
 def test_solids_are_made_for_those_who_ask() -> None:
     knee, true = kept.make_knee(SPEC), kept.make_new_knee(SPEC)
     points = np.random.default_rng(1).uniform(-60.0, 60.0, (50, 3))

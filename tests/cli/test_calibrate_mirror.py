@@ -226,16 +226,17 @@ def test_damaged_alignments_are_refused(content: str, words: str, tmp_path: Path
     refused(command, capsys, 3, words)
 
 
-def test_a_view_without_all_its_pictures_is_refused(
-    views: Photographed, tmp_path: Path, capsys
-) -> None:
+def test_a_view_without_all_its_pictures_is_refused(tmp_path: Path, capsys) -> None:
+    board, rig, folder = (tmp_path / name for name in ("board.json", "rig.yml", "views"))
+    board.write_text(json.dumps(keys_of(BOARD)), encoding="utf-8")
+    write_rig(rig, make_default_rig())
+    folder.mkdir()
     for side in SIDES[:3]:
-        (tmp_path / f"{side}_7.png").write_bytes((views.folder / f"{side}_0000.png").read_bytes())
-    command = ["calibrate", "mirror", "--out", str(tmp_path / "d.yml"), *views.common]
-    command[command.index("--views") + 1] = str(tmp_path)
-    refused([*command, "--size", "1920x1080"], capsys, 3, "view 7", "no right picture")
-    command[command.index("--views") + 1] = str(tmp_path / "none")
-    refused([*command, "--size", "1920x1080"], capsys, 3, "does not exist")
+        cv2.imwrite(str(folder / f"{side}_7.png"), np.zeros((720, 1280, 3), np.uint8))
+    command = ["calibrate", "mirror", "--out", str(tmp_path / "d.yml"), "--size", "1920x1080"]
+    command += ["--board", str(board), "--rig", str(rig), "--views"]
+    refused([*command, str(folder)], capsys, 3, "view 7", "no right picture")
+    refused([*command, str(folder / "none")], capsys, 3, "does not exist")
 
 
 @pytest.mark.parametrize("flip", ["flip_horizontally", "flip_vertically"])

@@ -68,6 +68,7 @@ def test_a_box_where_no_bone_is_makes_a_file_and_says_so(files, tmp_path, capsys
     assert read_prior(out).box == (5, 5, 90, 90)
 
 
+@pytest.mark.release
 def test_a_box_makes_a_prior_that_finds_the_bone(files, tmp_path) -> None:
     out = tmp_path / "prior.json"
     out.write_text("old")

@@ -65,6 +65,7 @@ def test_a_board_moved_about_is_not_judged_and_that_is_said() -> None:
     assert str(found) == "the board is not held still"
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("scatter", few_of([SIGMA, 2e-4, 1e-3, 3e-3]))
 def test_random_scatter_hardly_ever_alarms_in_hundreds_of_looks(scatter: float) -> None:
     rng = np.random.default_rng(7)

@@ -368,6 +368,7 @@ def test_a_plate_slides_and_the_reasons_say_where(tmp_path: Path, capsys) -> Non
     assert "scene_from_model" in told.out
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("method", few_of(["bimcc", "icp"]))
 def test_a_ball_turns_and_is_no_registration(tmp_path: Path, method: str) -> None:
     ball = sphere(25.0, 60)

@@ -35,6 +35,7 @@ def surface_offsets_mm(ct, points, normals):
     return offsets[above.shape[1] - 1 - np.argmax(above[:, ::-1], axis=1)]
 
 
+@pytest.mark.release
 @pytest.mark.parametrize(("bone", "low", "high"), [("femur", 60.0, 90.0), ("tibia", -130.0, -95.0)])
 def test_the_surface_of_thick_cortex_is_that_of_the_mesh(knee, ct, bone, low, high):
     mesh = knee.bones[bone]

@@ -36,6 +36,7 @@ def open_edges(*meshes):
     return [edge for edge in edges if edge[::-1] not in edges]
 
 
+@pytest.mark.release
 def test_the_drilled_bone_and_its_hole_are_one_closed_surface(femur, entry):
     bone, wall, _ = drill_hole(femur, entry, AXIS)
     assert open_edges(femur) == []

@@ -23,6 +23,7 @@ def fitted(site):
     return FittedParts(site)
 
 
+@pytest.mark.release
 def test_components_are_closed_and_of_a_plausible_size(fitted) -> None:
     tray, insert = fitted.tray_and_insert
     for mesh, low, high in (

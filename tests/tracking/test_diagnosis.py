@@ -81,6 +81,7 @@ def test_what_the_mirrored_camera_measures_is_the_mirror_image() -> None:
     np.testing.assert_array_equal(twice.cloud.points_mm, measured.cloud.points_mm)
 
 
+@pytest.mark.release
 def test_swapped_pictures_are_called_so_at_the_first_registration() -> None:
     found = registered(is_swapped=True)
     assert all(one.verdict.status is not Status.OK for one in found)

@@ -53,6 +53,7 @@ def test_a_peer_is_scored_against_the_truth_in_all_frames_but_the_first(sequence
     assert [frame.tre_mm for frame in score(sequence, start_at(sequence, 0), lost)] == [None] * 4
 
 
+@pytest.mark.release
 def test_frames_before_the_start_are_without_a_pose(sequence) -> None:
     before, at, *after = score(sequence, start_at(sequence, 2), resting)
     assert (before.index, before.tre_mm, before.ms) == (1, None, None)
