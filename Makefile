@@ -19,11 +19,15 @@ CHECKED := NUMBA_BOUNDSCHECK=1 NUMBA_OPT=1 \
     NUMBA_CACHE_DIR=$(CHECKED_CACHE) \
     $(PYTEST) -q -n 1 --timeout 900 --every-kernel
 # Every kernel is run by one of them at least: --every-kernel sees to it.
-KERNEL_FILES = $(shell grep -rl --include='test_*.py' 'mark\.kernel' tests | sort)
-# What last passed with the check: kernels, those who call them, their tests, and what compiles them.
+KERNEL_FILES = $(shell grep -rl --include='test_*.py' 'mark\.kernel' tests)
+# What last passed with the check: kernels, those who call them or divide their rows, their tests
+# with what these use, and the compiler.
 CHECKED_RECORD := tests/kernels.checked
-CALLERS = $(shell grep -rlE --include='*.py' 'kernels import' navapp sim_devices drivers calibration | sort)
-CHECKED_SUM = $(shell cat $(KERNELS) $(CALLERS) $(KERNEL_FILES) constraints.txt | cksum | cut -d' ' -f1)
+CALLERS = navapp/geometry/bands.py \
+    $(shell grep -rl --include='*.py' 'kernels import' navapp sim_devices drivers calibration)
+TEST_HELPERS = $(shell find tests -name '*.py' ! -name 'test_*' ! -path 'tests/bench/*' ! -path 'tests/ui/*')
+CHECKED_SUM = $(shell cat $(sort $(KERNELS) $(CALLERS) $(KERNEL_FILES) $(TEST_HELPERS)) \
+    constraints.txt | cksum | cut -d' ' -f1)
 KERNEL_TESTS := tests/geometry/test_zbuffer.py tests/geometry/test_masks.py \
     tests/registration --ignore tests/registration/test_register.py \
     tests/sim_devices/test_raster_kernels.py tests/sim_devices/test_shading_kernels.py tests/sim_devices/test_renderer.py \
@@ -53,25 +57,25 @@ tutorial: setup  ## four steps on simulated devices: room, calibration, plan, na
 window: setup   ## the application, with its picture in a window of the desktop
 	@$(BIN)/navapp run --window
 
-test: setup  ## style, types, import rules and the tests: some minutes
-	@$(MAKE) --no-print-directory -j2 --output-sync=line check bytecode changed-kernels tests
+test: setup  ## style, types, import rules and the tests: eight minutes
+	@$(MAKE) --no-print-directory -j2 --output-sync=line check bytecode kernels-if-changed tests
 
 test-all: setup check bytecode  ## the release gate: as test, with every case of every test
 	$(PYTEST) -n 4 --dist loadgroup --release
 	$(CHECKED) --release $(KERNEL_TESTS) $(KERNEL_FILES)
 
-.PHONY: bytecode changed-kernels tests
+.PHONY: bytecode kernels-if-changed tests
 bytecode: setup
 	@$(PYTEST) -q --collect-only --release >/dev/null
 
-checked-kernels: setup bytecode  ## kernels with checked indices; remembers, for make test, that they passed
+checked-kernels: setup  ## kernels with checked indices; remembers, for make test, that they passed
 	@rm -rf $(filter-out $(CHECKED_CACHE),$(wildcard $(VENV)/numba-boundscheck*))
 	$(CHECKED) -m kernel $(KERNEL_FILES)
-	@echo $(CHECKED_SUM) > $(CHECKED_RECORD)
+	@echo "$(CHECKED_SUM) by make checked-kernels; to be committed with the kernels" > $(CHECKED_RECORD)
 
 # Minutes of compiling, beside the tests, unless the same kernels have passed before.
-changed-kernels: setup bytecode
-	@if test "$$(cat $(CHECKED_RECORD))" = $(CHECKED_SUM); then \
+kernels-if-changed: setup bytecode
+	@if grep -qs '^$(CHECKED_SUM) ' $(CHECKED_RECORD); then \
 	    echo "kernels: as they last passed with checked indices"; \
 	else $(MAKE) checked-kernels; fi
 

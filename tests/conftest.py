@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TextIO
 
+import hypothesis
 import psutil
 import pytest
 
@@ -110,8 +111,15 @@ def pytest_collection_finish() -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    # The pictures of cases that run before a release only are there without being asked for.
-    config.option.warn_unused_snapshots = not config.getoption("--release")
+    is_release = config.getoption("--release")
+    hypothesis.settings.register_profile("few", max_examples=30)
+    hypothesis.settings.register_profile("many", max_examples=150)
+    hypothesis.settings.load_profile("many" if is_release else "few")
+    if not is_release:
+        # Snapshots of cases that run before a release only: nobody asks for them, they stay.
+        config.option.warn_unused_snapshots = True
+        if config.option.update_snapshots:
+            raise pytest.UsageError("--snapshot-update needs --release: else it deletes snapshots")
     if config.getoption("--every-kernel"):
         from tests.kernels_run import EveryKernel
 
@@ -122,7 +130,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
         "--release",
         action="store_true",
-        help="also what is marked as release: the many further cases of one thing",
+        help="also what is marked as release: further cases, and slow tests of what others show",
     )
     parser.addoption(
         "--every-kernel",
@@ -137,8 +145,10 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 @pytest.fixture
-def empty_plots(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Plots are made and not drawn, which takes half a second each: their pictures are empty."""
+def empty_plots(monkeypatch: pytest.MonkeyPatch, pytestconfig: pytest.Config) -> None:
+    """Plots are made and not drawn, which takes half a second each; before a release they are."""
+    if pytestconfig.getoption("--release"):
+        return
 
     def write(_figure: object, file: TextIO, **_options: object) -> None:
         file.write("<svg></svg>")

@@ -11,7 +11,7 @@ from navapp.preop import AspectSettings
 
 
 @contextmanager
-def few_views(step_deg: float = 45.0) -> Iterator[None]:
+def from_few_sides(step_deg: float = 45.0) -> Iterator[None]:
     """Within it, the aspects of a plan are `step_deg` apart."""
     coarse = partial(navapp.preop.build_aspects, settings=AspectSettings(step_deg=step_deg))
     with pytest.MonkeyPatch.context() as patch:

@@ -12,7 +12,7 @@ def few_of(cases: Iterable[Any], n: int = 1) -> list[Any]:
 
 
 def few_rows_of(rows: Iterable[tuple[Any, ...]], n: int = 1) -> list[Any]:
-    """The same of several parameters, of which each row holds a value."""
+    """Rows of values, one for each of several parameters; those after the first `n` as above."""
     return [
         pytest.param(*row, marks=[pytest.mark.release] if number >= n else [])
         for number, row in enumerate(rows)

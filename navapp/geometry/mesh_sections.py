@@ -56,7 +56,7 @@ def find_piece(
 
 def count_corners(faces: NDArray[np.int32], is_marked: NDArray[np.bool_]) -> NDArray[np.uint8]:
     """(F,) how many corners of each triangle are marked; `is_marked` is one of each vertex."""
-    marks = is_marked.view(np.uint8)
+    marks = is_marked.astype(np.uint8)
     a, b, c = faces.T
     # A sum along an axis of three takes several times as long.
     n_corners: NDArray[np.uint8] = marks[a] + marks[b] + marks[c]

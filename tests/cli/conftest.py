@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.calibration.photographed import KEYS, good_poses, photograph
-from tests.few_views import few_views
+from tests.few_views import from_few_sides
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -31,7 +31,7 @@ def good_pairs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return photograph(tmp_path_factory.mktemp("good"), good_poses())
 
 
-@pytest.fixture(name="few_views")
-def _few_views() -> Iterator[None]:
-    with few_views():
+@pytest.fixture
+def few_views() -> Iterator[None]:
+    with from_few_sides():
         yield

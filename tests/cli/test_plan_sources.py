@@ -10,7 +10,7 @@ import SimpleITK
 from navapp.cli.main import run
 from navapp.preop import read_origin, read_plan, read_plan_view
 from navapp.preop.slices import DIRECTIONS
-from tests.few_views import few_views
+from tests.few_views import from_few_sides
 
 SPACING_MM = (0.8, 0.8, 1.0)
 TURN = np.array([[0.96, -0.28, 0.0], [0.28, 0.96, 0.0], [0.0, 0.0, 1.0]])
@@ -44,7 +44,7 @@ def labels(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def planned(labels: Path) -> Path:
     folder = labels.parent / "plan"
-    with few_views():
+    with from_few_sides():
         assert run([
             "plan", "--labels", str(labels), "--label", "femur=5", "--label", "tibia=6",
             "--side", "left", "--out", str(folder), "--json", str(labels.parent / "made.json"),

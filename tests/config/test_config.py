@@ -204,7 +204,7 @@ def section_of(lines: list[str], index: int) -> str:
 TEXT = st.text(st.characters(exclude_categories=["Cs"]), max_size=12)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(deadline=None)
 @given(
     TEXT,
     st.floats(1e-300, 1e300),

@@ -246,7 +246,7 @@ def act(bench: Bench, action) -> None:
 
 
 @settings(
-    max_examples=30, deadline=None, derandomize=True,
+    max_examples=60, deadline=None, derandomize=True,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
 )  # fmt: skip
 @given(actions=ACTIONS)

@@ -12,7 +12,7 @@ from navapp.evaluation import compute_mean_tre_mm
 from navapp.geometry.transform import RigidTransform
 from navapp.preop import read_plan
 from navapp.values import BoneModel
-from tests.few_views import few_views
+from tests.few_views import from_few_sides
 
 pytestmark = [pytest.mark.data, pytest.mark.slow]
 CUTS = ("femur_distal", "femur_anterior")
@@ -28,7 +28,7 @@ def plan(data: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
         "--contents", str(root / "contents.toml"), "--out", str(folder),
     ]  # fmt: skip
     # The bone is looked for near a pose: nobody asks for its aspects.
-    with few_views():
+    with from_few_sides():
         assert run(["--quiet", "plan", *arguments]) == 0
     return folder
 
@@ -89,7 +89,7 @@ def assert_measured(data: Path, measured: dict[str, Any]) -> None:
 def test_a_cut_bone_is_followed_and_its_faces_are_measured(
     data: Path, plan: Path, tmp_path: Path
 ) -> None:
-    code, result = replay(data, plan, tmp_path, "patient", "--frames", "10")
+    code, result = replay(data, plan, tmp_path, "patient")
     assert code == 0
     frames = result["frames"]
     off_mm = errors_mm(data, plan, "patient", frames)

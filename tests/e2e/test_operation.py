@@ -1,4 +1,4 @@
-"""`navapp run` on the simulated operation: any stage to start in, and all five in one session."""
+"""`navapp run` on the simulated operation: two stages and into the third; before a release all."""
 
 import json
 from pathlib import Path

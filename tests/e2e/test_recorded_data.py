@@ -14,7 +14,7 @@ from navapp.evaluation import compute_mean_tre_mm
 from navapp.geometry.ply import read_ply
 from navapp.geometry.transform import RigidTransform
 from navapp.values import BoneModel
-from tests.few_views import few_views
+from tests.few_views import from_few_sides
 from tests.many import few_of
 
 # Block matching alone does not reach it: this fails when the fine matching stops working.
@@ -30,7 +30,7 @@ def plan_of(data: Path, tmp_path_factory: pytest.TempPathFactory) -> Callable[[s
         folder = tmp_path_factory.mktemp(phantom) / "plan"
         surface = f"femur={data / phantom / 'femur.ply'}"
         # The first is only followed from poses: nobody asks for its aspects.
-        with few_views() if phantom == "phantom_a" else nullcontext():
+        with from_few_sides() if phantom == "phantom_a" else nullcontext():
             assert run(["--quiet", "plan", "--surface", surface, "--out", str(folder)]) == 0
         return folder
 

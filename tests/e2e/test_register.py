@@ -667,7 +667,6 @@ def test_people_are_told_no_unit_where_the_files_have_none(
     assert not re.search(r"\d (mm|m)\b", told.out + told.err)
 
 
-@pytest.mark.release
 def test_files_without_a_unit_that_differ_in_size_are_told_so(
     bone: Bone, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -27,7 +27,6 @@ def configured(folder: Path, stage: str = STAGE_SERIAL) -> list[str]:
     return ["--quiet", "--config", str(path)]
 
 
-@pytest.mark.release
 @pytest.mark.slow
 def test_a_session_turns_the_mirror_to_its_place_and_replays_without_it(tmp_path: Path) -> None:
     session, first, second = tmp_path / "session", tmp_path / "a.json", tmp_path / "b.json"

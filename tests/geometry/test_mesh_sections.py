@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from navapp.geometry.mesh import TriangleMesh, join_meshes
-from navapp.geometry.mesh_sections import clip_below, fill_section, section_lines
+from navapp.geometry.mesh_sections import clip_below, count_corners, fill_section, section_lines
 from tests.geometry.shapes import cube, sphere
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -20,6 +20,14 @@ def test_a_sphere_is_cut_in_a_closed_circle() -> None:
     np.testing.assert_allclose(line[0], line[-1])
     np.testing.assert_allclose(line[:, 2], 12.0, atol=1e-9)
     np.testing.assert_allclose(np.hypot(line[:, 0], line[:, 1]), 16.0, atol=0.1)
+
+
+def test_corners_are_counted_as_by_numpy() -> None:
+    ball = sphere(20.0, 24)
+    is_marked = np.random.default_rng(1).random((len(ball.vertices_mm), 2))[:, 0] > 0.5
+    n_corners = is_marked[ball.faces].sum(axis=1)
+    assert set(n_corners) == {0, 1, 2, 3}
+    np.testing.assert_array_equal(count_corners(ball.faces, is_marked), n_corners)
 
 
 def test_an_open_mesh_is_cut_in_an_open_line() -> None:

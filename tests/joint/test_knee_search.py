@@ -16,7 +16,6 @@ from tests.many import few_of
 GOAL = Goal(np.empty((0, 3)), 2.0)
 
 
-@pytest.mark.release
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", few_of([1405, 1406, 1408]))
 def test_a_tibia_is_found_from_the_femur_and_a_search_can_be_stopped(seed: int) -> None:

@@ -451,7 +451,6 @@ def test_what_is_smaller_than_a_kernel_fits_everywhere() -> None:
     assert "the scene is too small to fix a bone" in found.details
 
 
-@pytest.mark.release
 @pytest.mark.parametrize("seed", few_of(range(4)))
 def test_a_scene_that_holds_no_bone_is_no_registration(seed: int) -> None:
     """A noisy sheet lies against a bone's flank well enough: its residuals are no noise."""

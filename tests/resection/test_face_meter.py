@@ -60,7 +60,6 @@ def test_glints_that_each_eye_sees_elsewhere_do_not_move_the_face(meter: FaceMet
     assert 0.2 < off_mm <= face.bound_mm
 
 
-@pytest.mark.release
 def test_clipped_pixels_move_no_face_that_is_told(meter: FaceMeter) -> None:
     for glint in (1.0, 2.0, 4.0):
         left, right = pictures(pose(), glint=glint)
@@ -109,7 +108,6 @@ def test_a_face_that_is_hidden_or_looks_away_is_not_measured(meter: FaceMeter) -
     assert meter.measure(*pictures(pose()), estimate(away), PLANNED, ()) is None
 
 
-@pytest.mark.release
 def test_measurements_of_one_view_join_and_are_known_no_better_than_one(meter: FaceMeter) -> None:
     faces = []
     for seed in range(4):

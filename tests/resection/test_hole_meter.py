@@ -67,7 +67,6 @@ def test_an_error_of_the_pose_is_in_the_bound() -> None:
     assert np.linalg.norm(wrong.offset_mm - true_offset_mm(drilled()[3])) <= wrong.bound_mm
 
 
-@pytest.mark.release
 def test_where_nothing_was_drilled_nothing_is_told() -> None:
     found = measure(is_made=False)
     assert found is None or not found.is_told

@@ -53,7 +53,6 @@ def test_following_twice_gives_the_same_bits() -> None:
         assert one.left_from_bone.matrix.tobytes() == other.left_from_bone.matrix.tobytes()
 
 
-@pytest.mark.release
 @pytest.mark.slow
 def test_grey_pictures_do_as_well() -> None:
     a = room(is_grey=True, n_frames=2)

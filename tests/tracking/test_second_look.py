@@ -74,7 +74,7 @@ def test_what_surely_saw_another_size_is_not_overturned_by_a_second_look() -> No
 @pytest.mark.parametrize(
     ("said_before", "is_found"),
     few_rows_of(
-        [(Reason.COVERAGE_LOW, True), (Reason.AMBIGUOUS, False), (Reason.SIZE_DIFFERS, False)]
+        [(Reason.AMBIGUOUS, False), (Reason.COVERAGE_LOW, True), (Reason.SIZE_DIFFERS, False)]
     ),
 )
 def test_what_the_search_for_a_buried_bone_finds_is_looked_at_again(

@@ -119,7 +119,6 @@ def test_the_mouse_is_asked_for(tmp_path: Path) -> None:
         screen.close()
 
 
-@pytest.mark.release
 @pytest.mark.parametrize("number", few_of([signal.SIGTERM, signal.SIGHUP]))
 def test_a_signal_ends_it_in_order(tmp_path: Path, number: signal.Signals) -> None:
     screen = Screen(tmp_path, "run")

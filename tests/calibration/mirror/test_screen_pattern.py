@@ -9,7 +9,7 @@ from tests.many import few_of
 
 
 @pytest.mark.parametrize("size", few_of([(1920, 1080), (800, 600)]))
-@pytest.mark.parametrize("is_mirrored", few_of([False, True]))
+@pytest.mark.parametrize("is_mirrored", few_of([True, False]))
 def test_corners_are_found_where_they_are_drawn(size: tuple[int, int], is_mirrored: bool) -> None:
     pattern = make_pattern(*size)
     picture = pattern.draw()

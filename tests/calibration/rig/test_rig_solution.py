@@ -111,7 +111,6 @@ def test_too_few_views_are_refused(world):
             solve_rig(BOARD, world[1][:n], SIZE)
 
 
-@pytest.mark.release
 def test_frontal_views_are_refused(world):
     """At the picture's edges, where the line of sight meets the board aslant."""
     rng = np.random.default_rng(2)
@@ -122,7 +121,6 @@ def test_frontal_views_are_refused(world):
     assert any("frontally" in reason for reason in reasons_of(pairs)[1])
 
 
-@pytest.mark.release
 def test_a_board_that_stays_in_the_middle_is_refused(world):
     rng = np.random.default_rng(3)
     small = parse_board(
@@ -146,7 +144,6 @@ def test_a_board_that_stays_in_the_middle_is_refused(world):
         assert not (found.covered.bare[number] & marked).any()
 
 
-@pytest.mark.release
 def test_a_wrong_square_is_seen_by_a_known_distance(world):
     true, pairs = world
     wrong = replace(BOARD, spacing_mm=14.0, mark_mm=10.0)
@@ -160,7 +157,6 @@ def test_swapped_cameras_are_refused(world):
     assert any("swapped" in reason for reason in reasons_of(swapped)[1])
 
 
-@pytest.mark.release
 def test_pairs_out_of_order_are_refused_by_their_number(world):
     pairs = list(world[1])
     pairs[3], pairs[7] = (
@@ -173,7 +169,6 @@ def test_pairs_out_of_order_are_refused_by_their_number(world):
     assert any("pair 3" in reason and "pair 7" in reason for reason in reasons)
 
 
-@pytest.mark.release
 def test_a_blurred_view_is_dropped_and_the_rest_accepted(world):
     pairs = list(world[1])
     right = replace(pairs[5].right, blur_px=3.0)

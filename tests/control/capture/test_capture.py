@@ -147,7 +147,6 @@ def test_finish_solves_with_what_is_kept_and_tells(room):
     assert snapshot.outcome == Outcome(True, ("well",))
 
 
-@pytest.mark.release
 def test_a_rig_that_is_refused_asks_for_more_pairs(room):
     def solve(pairs, report):
         raise ResultError("no rig explains these views", remedy="look at the pictures")

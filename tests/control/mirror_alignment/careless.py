@@ -19,7 +19,7 @@ from tests.geometry.test_display_model_errors import seen_beside_mm
 
 # Aligned so badly, the crosses before are refused.
 SHAKING_PX = 3.0
-TOKEN_MOVES = {"enter": None, "token": NudgeCross(1, 0)}
+TOKEN_MOVES = {"token": NudgeCross(1, 0), "enter": None}
 _N_ANATOMY = 200
 
 

@@ -24,8 +24,8 @@ def fade(picture: np.ndarray, saturation: float) -> np.ndarray:
     return np.clip(np.rint(grey + saturation * (picture - grey)), 0, 255).astype(np.uint8)
 
 
-@pytest.mark.parametrize("saturation", few_of([1.0, 0.6, 0.35, 0.25, 0.15]))
-@pytest.mark.parametrize("size", few_of([0.985, 1.015]))
+@pytest.mark.parametrize("saturation", few_of([0.25, 1.0, 0.6, 0.35, 0.15]))
+@pytest.mark.parametrize("size", few_of([1.015, 0.985]))
 def test_a_model_of_another_size_stays_in_doubt(size: float, saturation: float) -> None:
     a = room()
     frame, bone = a.frames[1], a.tracker.model.bone
