@@ -64,7 +64,7 @@ test-all: setup check bytecode  ## the release gate: as test, with every case of
 	$(PYTEST) -n 4 --dist loadgroup --release
 	$(CHECKED) --release $(KERNEL_TESTS) $(KERNEL_FILES)
 
-.PHONY: bytecode kernels-if-changed tests
+.PHONY: bytecode kernels-if-changed tests style
 bytecode: setup
 	@$(PYTEST) -q --collect-only --release >/dev/null
 
@@ -79,15 +79,18 @@ kernels-if-changed: setup bytecode
 	    echo "kernels: as they last passed with checked indices"; \
 	else $(MAKE) checked-kernels; fi
 
-# With +, line by line as they come. More workers than cores: one runs the tests that wait.
-tests: check bytecode
+# With +, line by line as they come. More workers than cores: one runs the tests that wait. They
+# begin beside types, which take one core for a minute.
+tests: style bytecode
 	+$(PYTEST) -n 3 --dist loadgroup
 
-check: setup    ## style, types, import rules
-	$(BIN)/ruff format --check .
-	$(BIN)/ruff check .
+check: style    ## style, types, import rules
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+style: setup
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
 
 # A command of many lines, of which a filter tells few; it fails as the command does.
 told = { $(1) || touch $(VENV)/.failed; } | $(2); \

@@ -102,7 +102,7 @@ BREACHES = [
 ]
 
 
-@pytest.mark.parametrize(("path", "breach", "contract"), few_rows_of(BREACHES, 3))
+@pytest.mark.parametrize(("path", "breach", "contract"), few_rows_of(BREACHES))
 def test_a_deliberate_breach_is_found(
     checkout: Path, path: str, breach: str, contract: str
 ) -> None:

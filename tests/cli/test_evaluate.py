@@ -174,6 +174,7 @@ def test_a_quick_look_at_one_case_from_end_to_end(quick) -> None:
     assert "data:image/jpeg" in (out / "report.html").read_text()
 
 
+@pytest.mark.release
 def test_the_same_again_runs_nothing_and_says_the_same(quick, capsys, monkeypatch) -> None:
     out, done = quick
 

@@ -164,6 +164,7 @@ def test_a_blackout_suspends_and_light_resumes(undo) -> None:
     assert room.states()[7:] == ["navigating"] * 2
 
 
+@pytest.mark.release
 @pytest.mark.slow
 def test_a_live_session_gets_to_review_and_navigation(undo) -> None:
     """Free-running camera, reader thread, worker: a proposed pose makes small pictures enough."""

@@ -63,6 +63,7 @@ def test_the_rig_has_the_configured_baseline() -> None:
     assert take(baseline_mm=120.0)[1].rig.baseline_mm == pytest.approx(120.0)
 
 
+@pytest.mark.release
 @pytest.mark.parametrize(("share", "side"), few_rows_of([(0.3, "right"), (0.6, "left")]))
 def test_a_cloth_hides_its_share_of_the_bone_from_the_second_picture_on(share, side) -> None:
     open_picture, opened = take(2, side=side)

@@ -43,6 +43,7 @@ def mask_of(picture, body):
     return picture.body == picture.bodies.index(body)
 
 
+@pytest.mark.release
 def test_pictures_have_the_size_of_the_scaled_rig():
     assert world().render("left", 0).shape == (720, 1280, 3)
     small = world().render("right", 0, 0.5)

@@ -15,6 +15,7 @@ def track_patella(size: float, highlights: float) -> list[SizedFrame]:
     return list(track_sized(sequence, size))
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("highlights", few_of([0.0, 1.0]))
 @pytest.mark.parametrize("size", few_of([0.99, 1.0, 1.01]))
 def test_an_error_by_one_per_cent_of_size_hardly_exceeds_the_bound(

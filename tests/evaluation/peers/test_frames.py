@@ -61,6 +61,7 @@ def test_frames_before_the_start_are_without_a_pose(sequence) -> None:
     assert all(frame.tre_mm > 0.0 for frame in after)
 
 
+@pytest.mark.release
 def test_without_a_start_no_frame_has_a_pose(sequence) -> None:
     frames = score(sequence, None, resting)
     assert [(frame.index, frame.tre_mm, frame.ms) for frame in frames] == [

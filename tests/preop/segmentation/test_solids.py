@@ -4,6 +4,7 @@ import pytest
 from navapp.preop.segmentation.masks import compute_depth_mm, label_components
 from navapp.preop.segmentation.solids import find_solids
 from navapp.preop.volume.hounsfield import PADDING_HU
+from tests.many import few_of
 from tests.preop.ct_phantoms import (
     AIR_HU,
     MARROW_HU,
@@ -41,7 +42,7 @@ def test_a_hollow_bone_is_one_solid_with_its_marrow():
     assert label_components(solid, SPACING_MM, 0.0).max() == 1
 
 
-@pytest.mark.parametrize("threshold_hu", [150.0, 350.0])
+@pytest.mark.parametrize("threshold_hu", few_of([150.0, 350.0]))
 def test_a_shaft_that_the_volume_cuts_keeps_its_marrow(threshold_hu):
     hu = SOFT_HU + hollow_cylinder(POINTS, 12.0, 2.0, inside_hu=MARROW_HU)
     solid = find_solids(noisy(hu), SPACING_MM, threshold_hu)
