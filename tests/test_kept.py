@@ -60,6 +60,7 @@ def test_kept_tissue_components_and_drawn_meshes_are_what_is_made(tmp_path, monk
         monkeypatch.setattr(kept, "_write", None)  # nothing is made a second time
 
 
+@pytest.mark.release
 def test_other_arguments_are_other_things(tmp_path, monkeypatch) -> None:
     # Before anything is counted: the knee itself is kept as well, unless it is in memory.
     femur, tibia = (kept.make_knee(SPEC).bones[name] for name in ("femur", "tibia"))

@@ -36,6 +36,7 @@ def surfaces(tmp_path_factory) -> list[str]:
     return arguments
 
 
+@pytest.mark.release
 def test_contents_and_markups_go_into_the_plan_and_are_shown(surfaces, tmp_path, capsys) -> None:
     line = tmp_path / "drill femur second 4mm.mrk.json"
     line.write_text(json.dumps({"markups": [LINE]}), encoding="utf-8")

@@ -87,6 +87,7 @@ def bare_mm() -> np.ndarray:
     return seen[seen[:, 2] < mesh.vertices_mm[:, 2].min() + 60.0]
 
 
+@pytest.mark.release
 def test_the_camera_gives_a_pair_as_a_recording_does(files, tmp_path, capsys) -> None:
     out, config = tmp_path / "prior.json", tmp_path / "c.toml"
     rest = ["--box", "5,5,90,90", "--out", str(out)]

@@ -131,6 +131,7 @@ def test_a_cut_that_nobody_told_of_is_no_pose(data: Path, plan: Path, tmp_path: 
         assert result["summary"]["measured"] == {}
 
 
+@pytest.mark.release
 def test_an_unknown_plane_is_refused(
     data: Path, plan: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

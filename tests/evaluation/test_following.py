@@ -210,6 +210,7 @@ def knee() -> KnownSequence:
     return CaseTest(Case("man", "drilling", "instrument"), 0, 1).render(4)
 
 
+@pytest.mark.release
 @pytest.mark.slow
 def test_a_simulated_bone_is_followed_whatever_the_truth_is_said_to_be(knee) -> None:
     answers = follow(knee, "bimcc")

@@ -1,6 +1,7 @@
 """Default targets: on the joint's surfaces, spread, the same every time."""
 
 import numpy as np
+import pytest
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import pdist
 
@@ -10,6 +11,7 @@ from tests.geometry.shapes import sphere
 from tests.preop.knees import bones_of, knees
 
 
+@pytest.mark.release
 def test_targets_are_spread_over_the_surfaces_that_meet_in_the_joint() -> None:
     for knee in knees()[:6]:
         targets = make_default_targets(bones_of(knee))

@@ -53,6 +53,7 @@ def test_the_mouth_is_found_where_the_drill_went() -> None:
     assert np.linalg.norm(vertices_mm - found.entry_mm, axis=1).min() < 1.5
 
 
+@pytest.mark.release
 def test_a_plan_further_off_finds_the_same_mouth() -> None:
     planned = drilled()[3]
     aside = replace(planned, entry_mm=planned.entry_mm + 2.0 * planned.axes[0])

@@ -46,6 +46,7 @@ def test_the_surface_of_thick_cortex_is_that_of_the_mesh(knee, ct, bone, low, hi
     assert np.percentile(np.abs(offsets), 95) < 0.25
 
 
+@pytest.mark.release
 def test_tissues_have_their_values(knee, ct):
     inside_condyle = knee.landmarks["femur/medial_condyle"] + [0.0, 0.0, 12.0]
     shaft = knee.bones["femur"].vertices_mm

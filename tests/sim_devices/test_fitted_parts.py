@@ -43,6 +43,7 @@ def test_a_component_follows_the_face_that_it_sits_on(site, fitted) -> None:
         np.testing.assert_allclose(motion.rotate(planned.normal), made.normal, atol=1e-9)
 
 
+@pytest.mark.release
 def test_the_femoral_component_is_where_bone_was_removed(site, fitted) -> None:
     """Its joint surface is that of the joint, but for the groove and what the saw missed."""
     from scipy.spatial import cKDTree

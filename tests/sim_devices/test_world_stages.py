@@ -104,6 +104,7 @@ def test_the_patella_that_is_turned_over_lies_free_and_shows_its_joint_side(scen
     assert share_seen(site, "left", skin) > 0.35
 
 
+@pytest.mark.release
 @pytest.mark.parametrize("case", few_of([("patella", 2), ("implant", 1), ("spacer", 1)]), ids=str)
 def test_advancing_makes_the_next_step_and_changes_the_picture(case: tuple[str, int]) -> None:
     stage, n_steps = case

@@ -201,6 +201,7 @@ def test_a_frame_tells_that_an_instrument_stands_in_front() -> None:
     assert tracked.foreground.is_in_front[bone].mean() < 0.045
 
 
+@pytest.mark.release
 def test_guesses_are_told_from_matches_and_the_fill_is_timed() -> None:
     tracked, _, bone = swept()
     disparity_px, origin = tracked.foreground.depth

@@ -160,6 +160,7 @@ def test_a_rig_without_a_common_volume_has_a_report_too(found) -> None:
     assert "predicted error at the working volume unknown" in words
 
 
+@pytest.mark.release
 def test_it_is_written_whole(found, text, tmp_path) -> None:
     write_report(tmp_path / "r.html", found, Limits())
     assert (tmp_path / "r.html").read_text(encoding="utf-8") == text

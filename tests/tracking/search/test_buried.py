@@ -35,6 +35,7 @@ def test_a_rough_pose_leads_to_the_bone() -> None:
     assert told[-1] <= 1.0
 
 
+@pytest.mark.release
 @pytest.mark.slow
 def test_it_looks_around_a_prediction_from_which_nothing_answers() -> None:
     a = room()
