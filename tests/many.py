@@ -12,7 +12,7 @@ def few_of(cases: Iterable[Any], n: int = 1) -> list[Any]:
 
 
 def few_rows_of(rows: Iterable[tuple[Any, ...]], n: int = 1) -> list[Any]:
-    """Rows of values, one for each of several parameters; those after the first `n` as above."""
+    """Values of several parameters, a row for each case; rows after the first `n` likewise."""
     return [
         pytest.param(*row, marks=[pytest.mark.release] if number >= n else [])
         for number, row in enumerate(rows)

@@ -23,13 +23,14 @@ from navapp.control.prior_files import read_prior
 from navapp.geometry.display_model_files import read_display_model
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.rig_files import read_rig
-from navapp.preop import AspectSettings, build_aspects, write_plan
+from navapp.preop import build_aspects, write_plan
 from navapp.preop.contents_file import read_contents
 from navapp.tools.accuracy_tasks import read_divots
 from navapp.tools.plate_files import read_plate
 from navapp.tools.tool_files import read_tool
 from navapp.values import BoneModel, Plan
 from sim_devices.anatomy import make_knee
+from tests.few_sides import FEW_SIDES
 
 DOCS = Path(__file__).parents[1] / "docs"
 EXAMPLE = re.compile(r"^## (.+?)$|^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -112,10 +113,7 @@ def test_pairs_have_such_names(tmp_path: Path) -> None:
 
 def test_a_plan_holds_these_files(tmp_path: Path) -> None:
     bone = femur()
-    plan = Plan(
-        {"femur": bone},
-        aspects={"femur": build_aspects(bone, settings=AspectSettings(step_deg=45.0))},
-    )
+    plan = Plan({"femur": bone}, aspects={"femur": build_aspects(bone, settings=FEW_SIDES)})
     write_plan(tmp_path / "plan", plan)
     names = {path.name for path in (tmp_path / "plan").iterdir()}
     assert names == set(examples()["Plan"][0][1].split())

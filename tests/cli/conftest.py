@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.calibration.photographed import KEYS, good_poses, photograph
-from tests.few_views import from_few_sides
+from tests.few_sides import from_few_sides
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -32,6 +32,6 @@ def good_pairs(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def few_views() -> Iterator[None]:
+def few_sides() -> Iterator[None]:
     with from_few_sides():
         yield

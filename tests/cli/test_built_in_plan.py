@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 from navapp.cli.main import run
 from navapp.preop import read_plan
 
-pytestmark = pytest.mark.usefixtures("few_views")
+pytestmark = pytest.mark.usefixtures("few_sides")
 
 EXAMPLE = Path(__file__).parents[2] / "docs" / "contents.toml"
 

@@ -10,8 +10,9 @@ import pytest
 
 from navapp.cli.main import run
 from navapp.geometry.ply import read_ply
-from navapp.preop import AspectSettings, build_aspects, write_plan
+from navapp.preop import build_aspects, write_plan
 from navapp.values import BoneModel, Plan
+from tests.few_sides import FEW_SIDES
 
 pytestmark = pytest.mark.usefixtures("empty_plots")
 
@@ -19,7 +20,7 @@ pytestmark = pytest.mark.usefixtures("empty_plots")
 @pytest.fixture(scope="module")
 def plan(data, tmp_path_factory) -> Path:
     bone = BoneModel("femur", read_ply(data / "phantom_a" / "femur.ply")[0], "right")
-    aspects = build_aspects(bone, settings=AspectSettings(step_deg=45.0))
+    aspects = build_aspects(bone, settings=FEW_SIDES)
     folder: Path = tmp_path_factory.mktemp("phantom") / "plan"
     write_plan(folder, Plan({"femur": bone}, aspects={"femur": aspects}))
     return folder

@@ -12,7 +12,7 @@ from navapp.geometry.ply import write_ply
 from navapp.preop import read_plan
 from tests.geometry.shapes import sphere
 
-pytestmark = pytest.mark.usefixtures("few_views")
+pytestmark = pytest.mark.usefixtures("few_sides")
 
 BONE = sphere(40.0, 20)
 

@@ -17,7 +17,7 @@ from navapp.values import ANKLE_CENTRE, HIP_CENTRE, Plan
 from sim_devices.anatomy import make_knee
 from sim_devices.world import World
 
-pytestmark = pytest.mark.usefixtures("few_views")
+pytestmark = pytest.mark.usefixtures("few_sides")
 
 EXAMPLE = Path(__file__).parents[2] / "docs" / "contents.toml"
 LINE = {

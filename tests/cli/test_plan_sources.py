@@ -10,7 +10,7 @@ import SimpleITK
 from navapp.cli.main import run
 from navapp.preop import read_origin, read_plan, read_plan_view
 from navapp.preop.slices import DIRECTIONS
-from tests.few_views import from_few_sides
+from tests.few_sides import from_few_sides
 
 SPACING_MM = (0.8, 0.8, 1.0)
 TURN = np.array([[0.96, -0.28, 0.0], [0.28, 0.96, 0.0], [0.0, 0.0, 1.0]])

@@ -12,7 +12,7 @@ from navapp.evaluation import compute_mean_tre_mm
 from navapp.geometry.transform import RigidTransform
 from navapp.preop import read_plan
 from navapp.values import BoneModel
-from tests.few_views import from_few_sides
+from tests.few_sides import from_few_sides
 
 pytestmark = [pytest.mark.data, pytest.mark.slow]
 CUTS = ("femur_distal", "femur_anterior")

@@ -87,7 +87,7 @@ def test_both_cameras_see_the_cut_faces_of_the_stage(scenario, stage) -> None:
 
 
 @pytest.mark.release
-@pytest.mark.parametrize("scenario", few_of(PATIENTS))
+@pytest.mark.parametrize("scenario", PATIENTS)
 def test_the_patella_that_is_turned_over_lies_free_and_shows_its_joint_side(scenario) -> None:
     site = world(scenario)
     site.states.set_stage("patella")
@@ -105,7 +105,7 @@ def test_the_patella_that_is_turned_over_lies_free_and_shows_its_joint_side(scen
 
 
 @pytest.mark.release
-@pytest.mark.parametrize("case", few_of([("patella", 2), ("implant", 1), ("spacer", 1)]), ids=str)
+@pytest.mark.parametrize("case", [("patella", 2), ("implant", 1), ("spacer", 1)], ids=str)
 def test_advancing_makes_the_next_step_and_changes_the_picture(case: tuple[str, int]) -> None:
     stage, n_steps = case
     site = world()

@@ -14,7 +14,6 @@ from navapp.tracking.outline import OutlineMeter
 from navapp.tracking.paper_tracker import PaperTracker
 from navapp.tracking.surface_meter import NEAR_BOX, NEAR_VIEW, WIDE_BOX, WIDE_VIEW
 from navapp.values import Origin, Prior, Reason, Status, Stopwatch
-from tests.many import few_of
 from tests.tracking.meters import Listening
 from tests.tracking.rooms import GOAL, room
 
@@ -36,7 +35,7 @@ def test_a_tracker_is_made_by_the_name_of_its_method() -> None:
 
 
 @pytest.mark.release
-@pytest.mark.parametrize("kind", few_of([IcpTracker, PaperTracker]))
+@pytest.mark.parametrize("kind", [IcpTracker, PaperTracker])
 def test_one_fit_to_so_many_points_makes_an_answer(kind) -> None:
     """At a glance around the pose, at a first registration with more room."""
     a = room()

@@ -16,8 +16,8 @@ def track_patella(size: float, highlights: float) -> list[SizedFrame]:
 
 
 @pytest.mark.release
-@pytest.mark.parametrize("highlights", few_of([0.0, 1.0]))
-@pytest.mark.parametrize("size", few_of([0.99, 1.0, 1.01]))
+@pytest.mark.parametrize("highlights", [0.0, 1.0])
+@pytest.mark.parametrize("size", [0.99, 1.0, 1.01])
 def test_an_error_by_one_per_cent_of_size_hardly_exceeds_the_bound(
     size: float, highlights: float
 ) -> None:
@@ -26,7 +26,7 @@ def test_an_error_by_one_per_cent_of_size_hardly_exceeds_the_bound(
     assert max(one.error_mm / one.bound_mm for one in frames) < (1.0 if size == 1.0 else UNSEEN)
 
 
-@pytest.mark.parametrize("highlights", few_of([0.0, 1.0]))
+@pytest.mark.parametrize("highlights", few_of([1.0, 0.0]))
 @pytest.mark.parametrize("size", few_of([0.97, 1.03, 0.93, 0.95, 1.05, 1.07]))
 def test_a_small_bone_of_another_size_is_refused(size: float, highlights: float) -> None:
     assert not any(one.is_ok for one in track_patella(size, highlights))

@@ -1,4 +1,4 @@
-"""Pictures of the screen; look at a difference before accepting it with --snapshot-update."""
+"""Pictures of the screen; look at a difference, then accept it: --release --snapshot-update."""
 
 import asyncio
 import dataclasses
