@@ -16,6 +16,7 @@ from navapp.geometry.halves import double, half_box, inside_of_halves
 from navapp.geometry.masks import where
 from navapp.geometry.rectification import Image, RectifiedPair
 from navapp.stereo.matching.census_sgm import CensusSettings, TwoViewDisparity, match_census
+from navapp.stereo.matte_pictures import find_clipped
 from navapp.stereo.subpixel.regional import RegionalSettings, regional_support
 
 # Below this share of left-right agreement the two pictures do not show the same scene that way
@@ -32,6 +33,8 @@ _COARSE_STEP_PX = 0.5
 _FAR_FROM_MATCH_PX = 1.5
 # What windows and the steps at the ends of a search ask for beside a box, at half resolution.
 WINDOW_PX = 8
+# A map at half resolution sees a pixel from so far off: its window, and what calms it.
+_REACH_PX = 2 * (SURFACE_CENSUS.radius_x + _CALM_PX // 2)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -126,6 +129,18 @@ def match_coarsely(pair: RectifiedPair, band_px: tuple[float, float]) -> CoarseM
     surface_px = calm(found.left.disparity_px)
     surface_px = double_disparity(surface_px, pair.box) if is_half else surface_px
     return CoarseMap(surface_px, pair.box, CoarseMatch(small, is_half, found, band_px))
+
+
+def find_glare(pair: RectifiedPair) -> NDArray[np.bool_]:
+    """(h, w) pixels of the pair's box, in the pictures, to which clipped ones may lead a match.
+
+    A lamp that is mirrored in a wet round surface is matched where its image lies: behind it.
+    """
+    import cv2
+
+    is_clipped = find_clipped(pair.left[pair.box.slices]).astype(np.uint8)
+    size = 2 * _REACH_PX + 1
+    return np.asarray(cv2.dilate(is_clipped, np.ones((size, size), np.uint8)) > 0)
 
 
 def are_swapped(

@@ -37,6 +37,7 @@ def compare(
     measured: DisparityMap,
     geometry: RectifiedGeometry,
     coarse_px: NDArray[np.float32] | None = None,
+    has_glare: NDArray[np.bool_] | None = None,
 ) -> Agreement:
     """Compare a rendered model with what was measured in the same box.
 
@@ -46,6 +47,8 @@ def compare(
         measured: disparity over the view's box; only matched pixels count.
         geometry: of the rectified pair.
         coarse_px: (h, w) coarse disparity of whatever is there, where `measured` is silent.
+        has_glare: (h, w) pixels of which the coarse disparity may be that of a mirrored lamp: no
+            evidence that the scene is seen through the model.
     """
     shape, is_matched = view.face_index.shape, measured.origin == Origin.MATCHED
     if coarse_px is None:
@@ -60,6 +63,8 @@ def compare(
     n_hidden = mark_large(classes, (NEARER, COARSELY_NEARER), _LEAST_REGION_PX2, is_hidden)
     mask = view.mask
     inner = _erase_rim(classes, mask)
+    if has_glare is not None:
+        inner[has_glare & (inner == COARSELY_FURTHER)] = 0
     n_behind = mark_large(inner, (FURTHER, COARSELY_FURTHER), _LEAST_REGION_PX2, is_behind)
     is_open = is_matched & mask & ~is_hidden
     n_open = int(np.count_nonzero(is_open))

@@ -2,6 +2,7 @@
 
 import threading
 import time
+from dataclasses import replace
 from functools import partial
 from typing import NamedTuple, Self
 
@@ -17,6 +18,7 @@ from navapp.stereo import (
     NearerSearch,
     StereoHealth,
     fill_surroundings,
+    find_glare,
     match_nearer,
     measure_health,
 )
@@ -32,6 +34,7 @@ class PairCheck(NamedTuple):
     agreement: Agreement | None  # of the model where it was matched; None of a free measurement
     # (h, w) coarse disparity of whatever lies in its box; None out of view or depth.
     coarse_px: NDArray[np.float32] | None
+    has_glare: NDArray[np.bool_] | None = None  # (h, w) as of `find_glare`, in its box
 
 
 class PairChecks:
@@ -135,7 +138,8 @@ def _run_check(
     if coarse_px is None:
         coarse = meter.measure_coarsely(pair, pose, found.box)
         coarse_px = None if coarse is None else coarse.disparity_px
-    agreement = (
-        None if view is None else compare(view, meter.model, found, meter.geometry, coarse_px)
-    )
-    return PairCheck(health, agreement, coarse_px)
+    has_glare = find_glare(replace(pair, box=found.box))
+    agreement = None
+    if view is not None:
+        agreement = compare(view, meter.model, found, meter.geometry, coarse_px, has_glare)
+    return PairCheck(health, agreement, coarse_px, has_glare)

@@ -86,6 +86,19 @@ def test_what_is_seen_through_the_model_is_told() -> None:
     assert found.open_coverage == found.coverage
 
 
+def test_a_mirrored_lamp_is_not_seen_through_the_model() -> None:
+    part = half()
+    silent, further, nearer = silent_in(part), coarse(20.0, part), coarse(-20.0, part)
+    found = compare(VIEW, MODEL, silent, GEOMETRY, further, part)
+    assert found.behind_fraction == 0.0
+    # What stands before the bone hides it, glossy or not.
+    found = compare(VIEW, MODEL, silent, GEOMETRY, nearer, part)
+    assert found == agreement(silent, nearer)
+    # Where the surface itself was measured, it is known.
+    measured = replace(MAP, disparity_px=MAP.disparity_px - np.float32(12.0))
+    assert compare(VIEW, MODEL, measured, GEOMETRY, further, part) == agreement(measured, further)
+
+
 @pytest.mark.parametrize("change_mm", [-1.0, 1.0])
 def test_a_coarse_map_says_nothing_about_a_millimetre(change_mm: float) -> None:
     part = half()
