@@ -217,7 +217,7 @@ def test_the_tibia_is_found_from_the_accepted_femur_and_a_replay_finds_it_in_the
     session, knee = tmp_path / "session", tmp_path / "knee.toml"
     knee.write_text('[camera.simulated]\nseed = 1305\nside = "left"\n', encoding="utf-8")
     first, second = tmp_path / "a.json", tmp_path / "b.json"
-    options = ["--quiet", "--config", str(knee), "run", "--headless", "--frames", "12"]
+    options = ["--quiet", "--config", str(knee), "run", "--headless", "--frames", "16"]
     options += ["--also", "tibia", "--record", str(session), "--json", str(first)]
     assert run(options) == 0
     frames = result(first)["frames"]
