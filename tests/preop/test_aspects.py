@@ -106,6 +106,13 @@ def test_views_fill_the_cone_and_only_it() -> None:
     assert between.min(axis=1).max() < 15.0
 
 
+def test_without_settings_views_are_eight_degrees_apart() -> None:
+    graph = build_aspects(femur_model(), (0.0, -0.6, -0.8), 14.0)
+    between = np.degrees(np.arccos(np.clip(graph.directions @ graph.directions.T, -1, 1)))
+    np.fill_diagonal(between, 180.0)
+    assert np.median(between.min(axis=1)) == pytest.approx(8.0, abs=1.0)
+
+
 def test_what_lies_behind_is_no_edge() -> None:
     """The far one of two balls in a row is hidden by the near one."""
     far, near = sphere().vertices_mm - (0, 0, 80.0), sphere().vertices_mm * 1.5
