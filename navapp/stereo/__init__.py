@@ -7,7 +7,7 @@ from navapp.stereo.chains import (
     match_scene,
     match_surface,
 )
-from navapp.stereo.coarse import CoarseMap, are_swapped, find_glare, match_coarsely
+from navapp.stereo.coarse import CoarseMap, are_swapped, find_near_clipped, match_coarsely
 from navapp.stereo.health import PictureHealth, StereoHealth, measure_health
 from navapp.stereo.subpixel.refine import (
     MODEL_REFINEMENT,
@@ -28,7 +28,7 @@ __all__ = [
     "StereoHealth",
     "are_swapped",
     "fill_surroundings",
-    "find_glare",
+    "find_near_clipped",
     "match_baseline",
     "match_coarsely",
     "match_nearer",

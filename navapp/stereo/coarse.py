@@ -33,8 +33,8 @@ _COARSE_STEP_PX = 0.5
 _FAR_FROM_MATCH_PX = 1.5
 # What windows and the steps at the ends of a search ask for beside a box, at half resolution.
 WINDOW_PX = 8
-# A map at half resolution sees a pixel from so far off: its window, and what calms it.
-_REACH_PX = 2 * (SURFACE_CENSUS.radius_x + _CALM_PX // 2)
+# Half the census window of a map at half resolution, in pixels of the whole.
+_CLIPPED_REACH_PX = 2 * SURFACE_CENSUS.radius_x
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -131,15 +131,19 @@ def match_coarsely(pair: RectifiedPair, band_px: tuple[float, float]) -> CoarseM
     return CoarseMap(surface_px, pair.box, CoarseMatch(small, is_half, found, band_px))
 
 
-def find_glare(pair: RectifiedPair) -> NDArray[np.bool_]:
-    """(h, w) pixels of the pair's box, in the pictures, to which clipped ones may lead a match.
+def find_near_clipped(pair: RectifiedPair) -> NDArray[np.bool_]:
+    """(h, w) pixels of the pair's box whose coarse disparity may come from clipped pixels.
 
-    A lamp that is mirrored in a wet round surface is matched where its image lies: behind it.
+    A lamp that is reflected in a convex wet surface has its image behind the surface, and is
+    matched there. Clipped pixels outside the box are not looked at.
+
+    Args:
+        pair: rectified grey pictures; the box lies in them.
     """
     import cv2
 
     is_clipped = find_clipped(pair.left[pair.box.slices]).astype(np.uint8)
-    size = 2 * _REACH_PX + 1
+    size = 2 * _CLIPPED_REACH_PX + 1
     return np.asarray(cv2.dilate(is_clipped, np.ones((size, size), np.uint8)) > 0)
 
 

@@ -18,7 +18,7 @@ from navapp.stereo import (
     NearerSearch,
     StereoHealth,
     fill_surroundings,
-    find_glare,
+    find_near_clipped,
     match_nearer,
     measure_health,
 )
@@ -34,7 +34,7 @@ class PairCheck(NamedTuple):
     agreement: Agreement | None  # of the model where it was matched; None of a free measurement
     # (h, w) coarse disparity of whatever lies in its box; None out of view or depth.
     coarse_px: NDArray[np.float32] | None
-    has_glare: NDArray[np.bool_] | None = None  # (h, w) as of `find_glare`, in its box
+    is_near_clipped: NDArray[np.bool_]  # (h, w) as of `find_near_clipped`, in its box
 
 
 class PairChecks:
@@ -138,8 +138,8 @@ def _run_check(
     if coarse_px is None:
         coarse = meter.measure_coarsely(pair, pose, found.box)
         coarse_px = None if coarse is None else coarse.disparity_px
-    has_glare = find_glare(replace(pair, box=found.box))
+    is_near_clipped = find_near_clipped(replace(pair, box=found.box))
     agreement = None
     if view is not None:
-        agreement = compare(view, meter.model, found, meter.geometry, coarse_px, has_glare)
-    return PairCheck(health, agreement, coarse_px, has_glare)
+        agreement = compare(view, meter.model, found, meter.geometry, coarse_px, is_near_clipped)
+    return PairCheck(health, agreement, coarse_px, is_near_clipped)

@@ -149,7 +149,9 @@ class PoseJudge:
         if agreement is None and fit.estimate.has_finite_covariance:
             geometry, disparity = self._meter.geometry, measured.disparity
             view = model.render(fit.pose, geometry, disparity.box)
-            agreement = compare(view, model, disparity, geometry, check.coarse_px, check.has_glare)
+            agreement = compare(
+                view, model, disparity, geometry, check.coarse_px, check.is_near_clipped
+            )
         return fit, view, agreement
 
     def lost(self, reason: Reason, watch: Stopwatch) -> TrackedFrame:

@@ -86,17 +86,37 @@ def test_what_is_seen_through_the_model_is_told() -> None:
     assert found.open_coverage == found.coverage
 
 
-def test_a_mirrored_lamp_is_not_seen_through_the_model() -> None:
-    part = half()
+def highlight() -> np.ndarray:
+    """A square of the model's pixels, off its rim: a thirtieth of them."""
+    rows, columns = np.nonzero(SEEN)
+    side, y, x = int((SEEN.sum() / 30) ** 0.5), int(np.median(rows)), int(np.median(columns))
+    part = np.zeros_like(SEEN)
+    part[y : y + side, x : x + side] = True
+    assert (SEEN | ~part).all()
+    return part
+
+
+def test_a_reflected_lamp_is_not_seen_through_the_model() -> None:
+    part = highlight()
     silent, further, nearer = silent_in(part), coarse(20.0, part), coarse(-20.0, part)
-    found = compare(VIEW, MODEL, silent, GEOMETRY, further, part)
-    assert found.behind_fraction == 0.0
-    # What stands before the bone hides it, glossy or not.
-    found = compare(VIEW, MODEL, silent, GEOMETRY, nearer, part)
-    assert found == agreement(silent, nearer)
+    assert agreement(silent, further).behind_fraction > 0.03
+    assert compare(VIEW, MODEL, silent, GEOMETRY, further, part).behind_fraction == 0.0
+    # Beside clipped pixels it counts.
+    elsewhere = compare(VIEW, MODEL, silent, GEOMETRY, further, ~part)
+    assert elsewhere == agreement(silent, further)
+    # What stands before the bone hides it, clipped or not.
+    assert compare(VIEW, MODEL, silent, GEOMETRY, nearer, part) == agreement(silent, nearer)
     # Where the surface itself was measured, it is known.
     measured = replace(MAP, disparity_px=MAP.disparity_px - np.float32(12.0))
     assert compare(VIEW, MODEL, measured, GEOMETRY, further, part) == agreement(measured, further)
+
+
+def test_reflected_lamps_explain_a_twentieth_of_the_model_and_no_more() -> None:
+    part = half()
+    silent, further = silent_in(part), coarse(20.0, part)
+    without = agreement(silent, further).behind_fraction
+    found = compare(VIEW, MODEL, silent, GEOMETRY, further, part).behind_fraction
+    assert found == pytest.approx(without - 0.05, abs=1e-3)
 
 
 @pytest.mark.parametrize("change_mm", [-1.0, 1.0])

@@ -1,6 +1,7 @@
 """Checks that run while a pose is fitted."""
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -36,7 +37,8 @@ class CoarseMeter:
 
     model, geometry = femur_for_registration(), GEOMETRY
 
-    def __init__(self, fails: bool = False) -> None:
+    def __init__(self, fails: bool = False, disparity_px: float = 200.0) -> None:
+        self.disparity_px = disparity_px
         self.asked: list[Box | None] = []
         self.ended = 0
         self.fails = fails
@@ -49,7 +51,8 @@ class CoarseMeter:
             self.ended += 1
             raise ValueError("coarsely")
         found = box or Box(0, 0, GEOMETRY.width, GEOMETRY.height)
-        return CoarseMap(np.full((found.height, found.width), 200.0, np.float32), found)
+        shape = found.height, found.width
+        return CoarseMap(np.full(shape, self.disparity_px, np.float32), found)
 
 
 def checks_with(meter: CoarseMeter) -> PairChecks:
@@ -120,6 +123,21 @@ def test_only_what_was_measured_on_the_model_is_compared_with_it() -> None:
     model = femur_for_registration()
     assert found.agreement == compare(on_model.rendered, model, MAP, GEOMETRY, found.coarse_px)
     assert found.agreement.coverage > 0.9
+
+
+@pytest.mark.parametrize("grey", [250, 255])
+def test_what_is_seen_through_the_model_beside_clipped_pixels_does_not_count(grey: int) -> None:
+    on_model = measurement(is_on_model=True)
+    rows, columns = np.nonzero(on_model.rendered.mask)
+    middle = slice(int(np.median(rows)), None), slice(int(np.median(columns)), None)
+    hole = np.zeros(MAP.origin.shape, dtype=np.bool_)
+    hole[middle][:12, :12] = True
+    meter, pair = CoarseMeter(disparity_px=20.0), blank_pair()
+    pair.left[MAP.box.slices][hole] = grey
+    with PairChecks(meter, pair) as checks:
+        found = checks.check(replace(on_model, disparity=MAP.only(~hole)), TRUE).result()
+    assert found.is_near_clipped.any() == (grey == 255)
+    assert (found.agreement.behind_fraction > 0.0) == (grey == 250)
 
 
 def test_unknown_maps_are_checked_too() -> None:
