@@ -1,6 +1,5 @@
 """The simulated operating site: an opened knee on the table, seen by two cameras."""
 
-import threading
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
@@ -22,6 +21,7 @@ from sim_devices.cartilage import (
 )
 from sim_devices.drift import compute_drift_mm
 from sim_devices.fitted_parts import FittedParts
+from sim_devices.kept_scenes import STILL, KeptScenes
 from sim_devices.layout import left_from_table, mirror_pose, misplace, nominal_table_from_femur
 from sim_devices.materials import make_material_table
 from sim_devices.motion import LegMotion, compute_drill_motion, compute_sweep_offset_mm
@@ -29,7 +29,7 @@ from sim_devices.operation import State, enter
 from sim_devices.operation_record import OperationRecord
 from sim_devices.picture_motion import compute_path_px
 from sim_devices.planned_cuts import Cut
-from sim_devices.renderer import DepthPicture, Part, Renderer, Surfaces
+from sim_devices.renderer import DepthPicture, Surfaces
 from sim_devices.rigs import (
     NO_TURN,
     Turn,
@@ -37,7 +37,6 @@ from sim_devices.rigs import (
     make_default_rig,
 )
 from sim_devices.scenario import Scenario
-from sim_devices.scenes import Scene, make_scene
 from sim_devices.sensor import Eye, Rows
 from sim_devices.shake import ArmShake
 from sim_devices.site import Site, make_site
@@ -45,17 +44,13 @@ from sim_devices.state_history import StateHistory
 from sim_devices.textures import make_noise_tile
 
 _TISSUE_FOLLOWS = 0.9
-# States that are shown again soon: going back and forth makes none anew.
-_KEPT_STATES = 4
 _DEFECT_RADIUS_MM = 9.0
 _HAND_ABOVE_MM = 32.0
 # What lies in the room and not on the leg.
 _BESIDE_LEG = frozenset({"drape", "hand"})
 # Of the vertices of a part, so many say how fast it moves in the picture.
 _N_WATCHED = 150
-# What moves in the picture only as the rig shakes. It costs half of a picture, and is drawn anew
-# only when it may have moved by so much.
-_STILL = frozenset({"drape"})
+# What lies still is drawn anew only when the rig's shake may have moved it by so much.
 _STILL_STEP_PX = 0.25
 # Of the size of the pictures in which the rows of a body are looked for.
 _COARSE = 0.25
@@ -110,15 +105,14 @@ class World:
         self._site = self._make_site(right)
         self._fitted = FittedParts(self._site)
         self.record = OperationRecord(self._site, self._fitted, is_left=self._is_left)
-        self._surfaces = Surfaces(
+        surfaces = Surfaces(
             make_material_table(scenario.contrast, scenario.blood, scenario.highlights),
             make_noise_tile(scenario.seed),
             _LAMPS if not self._is_left else _LAMPS * (-1.0, 1.0, 1.0, 1.0),
         )
-        self._lock = threading.Lock()
-        self._renderers: dict[tuple[State, Eye, float, Turn], Renderer] = {}
-        self._others: dict[tuple[State, Camera], Renderer] = {}
-        self._scenes: dict[State, Scene] = {}
+        self._scenes = KeptScenes(
+            self.rig, self._site, self._fitted, surfaces, scenario.seed, self._is_left
+        )
         self.states = StateHistory(enter(scenario.stage))
 
     @property
@@ -247,18 +241,15 @@ class World:
             rows: only these need be right; None: all.
         """
         state = self.states.take_picture(time_ns)
-        with self._lock:
-            renderer = self._renderer(state, eye, scale, turn_rad)
+        renderer = self._scenes.renderer(state, eye, scale, turn_rad)
         seen_from = camera_from_left(self.rig, eye, turn_rad)
         return renderer.render(*self._poses(seen_from, state, time_ns), rows)
 
     def path_px(self, from_ns: int, until_ns: int) -> float:
         """The longest way that anything goes in the left picture (full size) in an interval."""
         state, longest_px = self._state, 0.0
-        with self._lock:
-            parts = self._scene(state).parts
-        for part in parts:
-            if part.body not in _STILL or not self._shake.is_still:
+        for part in self._scenes.scene(state).parts:
+            if part.body not in STILL or not self._shake.is_still:
                 vertices_mm = part.mesh.vertices_mm
                 watched_mm = vertices_mm[:: max(1, len(vertices_mm) // _N_WATCHED)]
                 pose = partial(self._left_from_body, part.body, state=state)
@@ -271,8 +262,7 @@ class World:
         return self._depth(eye, time_ns, scale, self._state)
 
     def _depth(self, eye: Eye, time_ns: int, scale: float, state: State) -> DepthPicture:
-        with self._lock:
-            renderer = self._renderer(state, eye, scale)
+        renderer = self._scenes.renderer(state, eye, scale)
         return renderer.depth(*self._poses(camera_from_left(self.rig, eye), state, time_ns))
 
     def render_for(
@@ -286,58 +276,12 @@ class World:
             time_ns: world time.
         """
         state = self._state
-        with self._lock:
-            renderer = self._renderer_for(state, camera)
+        renderer = self._scenes.renderer_for(state, camera)
         poses = {
             body: seen_from @ self._rest_from_body(body, time_ns, state)
             for body in self._bodies_of(state)
         }
         return renderer.render(poses, seen_from @ self._left_from_table)
-
-    def _renderer(self, state: State, eye: Eye, scale: float, turn_rad: Turn = NO_TURN) -> Renderer:
-        """That of an eye as it stands: what lies still is drawn once and kept."""
-        key = (state, eye, scale, turn_rad)
-        if key not in self._renderers:
-            rig = self.rig if scale == 1.0 else self.rig.scale(scale)
-            camera = rig.left if eye == "left" else rig.right
-            self._renderers[key] = self._make_renderer(camera, self._scene(state).parts, scale)
-        return self._renderers[key]
-
-    def _renderer_for(self, state: State, camera: Camera) -> Renderer:
-        """That of another camera, kept likewise."""
-        key = (state, camera)
-        if key not in self._others:
-            self._others[key] = self._make_renderer(camera, self._scene(state).parts)
-        return self._others[key]
-
-    def _make_renderer(
-        self, camera: Camera, parts: tuple[Part, ...], scale: float = 1.0
-    ) -> Renderer:
-        return Renderer(camera, parts, self._surfaces_at(scale), _STILL)
-
-    def _scene(self, state: State) -> Scene:
-        """Made at the first call, and kept until others have taken its place."""
-        if state not in self._scenes:
-            self._forget_all_but_newest()
-            made = make_scene(self._site, self._fitted, state)
-            parts = tuple(self._mirror_if_left(part) for part in made.parts)
-            self._scenes[state] = replace(made, parts=parts)
-        return self._scenes[state]
-
-    def _forget_all_but_newest(self) -> None:
-        """A renderer takes hundreds of MB, and an operation passes through a dozen states."""
-        for old in list(self._scenes)[: -_KEPT_STATES + 1]:
-            del self._scenes[old]
-            self._renderers = {k: one for k, one in self._renderers.items() if k[0] != old}
-            self._others = {k: one for k, one in self._others.items() if k[0] != old}
-
-    def _surfaces_at(self, scale: float) -> Surfaces:
-        """Smaller pictures need a blurred texture, or its finest octave would flicker."""
-        if scale >= 0.8:
-            return self._surfaces
-        blur = 0.6 * (1.0 / scale - 1.0)
-        tile = make_noise_tile(self.scenario.seed, round(blur, 1))
-        return Surfaces(self._surfaces.materials, tile, self._surfaces.lamps)
 
     def _poses(
         self, seen_from: RigidTransform, state: State, time_ns: int
@@ -347,14 +291,14 @@ class World:
         still_ns = round(time_ns / step_ns) * step_ns
         poses = {
             body: seen_from
-            @ self._left_from_body(body, still_ns if body in _STILL else time_ns, state)
+            @ self._left_from_body(body, still_ns if body in STILL else time_ns, state)
             for body in self._bodies_of(state)
         }
         left_from_rest = self._shake.left_from_rest(time_ns / 1e9)
         return poses, seen_from @ left_from_rest @ self._left_from_table
 
     def _bodies_of(self, state: State) -> tuple[str, ...]:
-        return tuple(dict.fromkeys(part.body for part in self._scene(state).parts))
+        return tuple(dict.fromkeys(part.body for part in self._scenes.scene(state).parts))
 
     def _table_from_body(self, body: str, time_s: float, state: State) -> RigidTransform:
         """As for a right knee."""
@@ -377,7 +321,7 @@ class World:
             return RigidTransform.identity("table", "drape")
         if body == "hand":
             offset = compute_sweep_offset_mm(self.scenario.instrument, time_s)
-            height = self._scene(state).tissue_top_mm - _HAND_ABOVE_MM
+            height = self._scenes.scene(state).tissue_top_mm - _HAND_ABOVE_MM
             return RigidTransform.from_parts(
                 "table", "hand", np.eye(3), offset + np.array([0.0, 0.0, height])
             )
@@ -405,13 +349,6 @@ class World:
     def worn_vertices(self) -> NDArray[np.int64]:
         """Vertices of the femur's bone where its cartilage is mostly worn away, as a CT shows."""
         return np.flatnonzero(self._site.worn > 0.5).astype(np.int64)
-
-    def _mirror_if_left(self, part: Part) -> Part:
-        if not self._is_left:
-            return part
-        return Part(
-            part.body, mirror_mesh(part.mesh), part.material, part.mark, part.exposure, -1.0
-        )
 
     def _defect_mm(self) -> FloatArray:
         """(3,) middle of the worn patch: on the medial condyle, in front of its lowest point."""

@@ -124,8 +124,9 @@ def bone_masks(eye: SimulatedEye, time_ns: int) -> tuple[np.ndarray, np.ndarray]
     """(h, w) of the femur from the eye: all of it, and what nothing hides."""
     world, camera = knee().world, eye.view.camera
     state = world._state
-    renderer, parts = world._renderer_for(state, camera), world._scene(state).parts
+    renderer, parts = world._scenes.renderer_for(state, camera), world._scenes.scene(state).parts
     poses = world._poses(eye._seen_from, state, time_ns)
-    alone = Renderer(camera, [part for part in parts if part.body == "femur"], world._surfaces)
+    femur = [part for part in parts if part.body == "femur"]
+    alone = Renderer(camera, femur, world._scenes.surfaces)
     seen = renderer.depth(*poses)
     return alone.depth(*poses).body >= 0, seen.body == seen.bodies.index("femur")

@@ -196,12 +196,12 @@ def test_a_left_knee_is_the_mirror_image_of_a_right_one():
     camera_from_table = RigidTransform.from_parts("camera", "table", np.eye(3), (0.0, 0.0, 450.0))
     pictures = []
     for site in (right, left):
-        parts = site._scene(site._state).parts
+        parts = site._scenes.scene(site._state).parts
         poses = {
             part.body: camera_from_table @ table @ site.left_from_body(part.body, 0)
             for part in parts
         }
-        renderer = Renderer(camera, parts, site._surfaces, frozenset({"drape"}))
+        renderer = Renderer(camera, parts, site._scenes.surfaces, frozenset({"drape"}))
         pictures.append(renderer.render(poses, camera_from_table))
     difference = np.abs(pictures[0] - pictures[1][:, ::-1]).max(axis=2)
     assert np.median(difference) < 1e-3
@@ -301,7 +301,7 @@ def test_a_bare_bone_has_no_thickness_anywhere():
 
 def test_edges_of_large_triangles_follow_the_lens():
     site = world()
-    parts = site._scene(site._state).parts
+    parts = site._scenes.scene(site._state).parts
     camera = site.rig.left
     for part in parts:
         pose = site.left_from_body(part.body, 0)

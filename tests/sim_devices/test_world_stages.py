@@ -74,7 +74,7 @@ def test_both_cameras_see_the_cut_faces_of_the_stage(scenario, stage) -> None:
     planes = site.record.made_planes
     faces = [
         part
-        for part in site._scene(site._state).parts
+        for part in site._scenes.scene(site._state).parts
         if part.material is MaterialId.SAWN_BONE and part.body == BONES[stage]
     ]
     for name in SEEN[stage]:
@@ -98,7 +98,7 @@ def test_the_patella_that_is_turned_over_lies_free_and_shows_its_joint_side(scen
     bone, pose = site.anatomy.bones["patella"], site.left_from_body("patella", 0)
     towards = pose.rotate(np.array([0.0, 1.0, 0.0]))
     assert towards[2] < -0.9
-    (skin, *_) = [p for p in site._scene(site._state).parts if p.body == "patella"]
+    (skin, *_) = [p for p in site._scenes.scene(site._state).parts if p.body == "patella"]
     joint = bone.normals[:, 1] > 0.5
     assert joint.mean() > 0.25
     assert share_seen(site, "left", skin) > 0.35
@@ -145,7 +145,7 @@ def test_metal_mirrors_the_lamps_and_bone_does_not() -> None:
     # A lamp's image is far beyond what the sensor holds.
     assert (metal[femur].max(axis=1) > 3.0).sum() > 30
     assert (bone[femur].max(axis=1) > 3.0).sum() == 0
-    table = site._surfaces.materials
+    table = site._scenes.surfaces.materials
     assert table[MaterialId.METAL, 21] > 0.5
     assert table[MaterialId.METAL, 22] <= 0.2
 
