@@ -27,8 +27,9 @@ _LEAST_REGION_PX2 = 25
 _RIM_PX = 4
 # Neighbours share their errors: every second row and column tells the spread as well.
 _SPREAD_STRIDE_PX = 2
-# So much of the model may show reflected lamps: at right poses of wet femurs up to 0.047 does.
-# Without a limit, a bone that was cut unknown to the plan would fit, were its face full of glints.
+# So much of the model may show reflected lamps; as much as may be seen through at a right pose
+# (`verdict.RULES`). Without a limit, a bone that was cut unknown to the plan would fit where
+# highlights cover its face.
 _MOST_REFLECTED = 0.05
 # Of a normal distribution: its standard deviation over its median absolute deviation.
 _MAD_TO_SIGMA = 1.4826

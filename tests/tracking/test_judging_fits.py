@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from navapp.registration import estimate_at
-from navapp.tracking import TrackState
+from navapp.tracking import TrackState, judging
 from navapp.tracking.agreement import compare
 from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.tracking.checks import PairChecks
@@ -106,7 +106,9 @@ def test_a_seen_size_is_in_the_bound_and_not_in_the_covariance(hidden_fraction: 
     )
 
 
-def test_a_fit_on_the_model_is_compared_where_it_was_matched_a_free_one_where_it_rests() -> None:
+def test_a_fit_on_the_model_is_compared_where_it_was_matched_a_free_one_where_it_rests(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     a = room()
     frame, checks, fit = found_at_the_truth(a)
     as_matched = altered(checks, fit, coverage=0.77)
@@ -114,7 +116,10 @@ def test_a_fit_on_the_model_is_compared_where_it_was_matched_a_free_one_where_it
     assert judge.judge(frame, fit, GOAL, checks=as_matched).verdict.coverage == 0.77
     check = as_matched.check(fit.measured, fit.pose).result()
     free = replace(fit, measured=replace(fit.measured, rendered=None))
+    asked = []
+    monkeypatch.setattr(judging, "compare", lambda *said: asked.append(said) or compare(*said))
     answer = judge.judge(frame, free, GOAL, checks=Told(check._replace(agreement=None)))
+    assert asked[0][-1] is check.is_near_clipped
     disparity, geometry = fit.measured.disparity, a.tracker.meter.geometry
     view = a.tracker.model.render(fit.pose, geometry, disparity.box)
     there = compare(view, a.tracker.model, disparity, geometry, check.coarse_px)
