@@ -31,8 +31,9 @@ class TrackerParts(BimccTracker):
         return Frame(self.meter.rectify(left, right, start, margins), start, Stopwatch())
 
     def find(self, frame: Frame) -> Fit | None:
-        """The first fit near the start: where the model rests, if it does. None out of view."""
-        return next(self.near.find(frame))
+        """The fit near the start that the judge ranks first, of all that are offered."""
+        fits = [fit for fit in self.near.find(frame) if fit is not None]
+        return min(fits, key=lambda fit: self.verdict(frame, fit).rank, default=None)
 
     def verdict(self, frame: Frame, fit: Fit) -> Verdict:
         """What is said of a fit, by what is seen alone."""
