@@ -5,9 +5,10 @@ usage: python -m tests.bench.noise_limit [--seeds N] [--first SEED] [--stage NAM
 Some frames each of simulated knees whose plans and rigs are exact, followed by bimcc. Root mean
 square errors over targets and OK frames, step by step as in `navapp evaluate`
 (docs/evaluation.md): on pictures as they usually are, without noise, without highlights, without
-both, with twice the texture besides, and as usual with a model whose surface is trusted to 0.01 mm
-instead of 0.1 mm. The limit is always that of the usual noise, and so is the choice of the pixels
-that obey the model. What is left without noise has another cause.
+both, with twice the texture besides, with a saw that misses nothing, and as usual with a model
+whose surface is trusted to 0.01 mm instead of 0.1 mm. The limit is always that of the usual noise,
+and so is the choice of the pixels that obey the model. What is left without noise has another
+cause.
 """
 
 import argparse
@@ -41,6 +42,7 @@ VARIANTS: dict[str, tuple[dict[str, float], float]] = {
         _NOISELESS | _MATT | {"contrast": 0.1},
         RegistrationModel.SURFACE_SIGMA_MM,
     ),
+    "cuts exactly as planned": ({"misses": 0.0}, RegistrationModel.SURFACE_SIGMA_MM),
     "usual, surface to 0.01 mm": ({}, 0.01),
 }
 

@@ -16,7 +16,7 @@ from navapp.stereo.subpixel.regional import RegionalSettings, regional_support
 from navapp.values import DisparityMap
 
 # Steps of a coarse map are about half a pixel of it.
-_SURFACE = RegionalSettings(radius_px=12, thin=4, min_samples=8)
+_SURFACE = RegionalSettings(radius_px=12)
 _N_TURNS = 2
 # On a support that is itself measured, a larger window rounds off crests.
 _RADIUS_PX = 4

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from navapp.geometry.bands import in_row_bands
 from navapp.stereo.subpixel.regional_kernels import N_TERMS, Rules, blend_rows, fit_rows
 
-_TAPER = np.float32(1.5)
-# For each known sample: on 1, u, v, u^2, uv, v^2. A polynomial that hangs on few samples may
+_TAPER = 1.5
+# For each known sample: on 1, u, v, u^2, uv, v^2. A quadratic that hangs on few samples may
 # neither tilt nor bend much.
 _RIDGE = np.array([1e-6, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3], dtype=np.float32)
 
@@ -27,7 +27,7 @@ class RegionalSettings:
     thin: int = 2  # every thin-th pixel each way is a sample; divides `node_px`
     # residual that counts a quarter; one for each iteration.
     scales_px: tuple[float, ...] = (3.0, 1.5, 0.7, 0.35)
-    min_samples: int = 20  # a node with fewer known samples in its window has no polynomial
+    min_samples: int = 20  # a node with fewer known samples in its window has no quadratic
 
     def __post_init__(self) -> None:
         if not 1 <= self.thin <= self.node_px <= self.radius_px or self.node_px % self.thin:
@@ -41,17 +41,15 @@ class RegionalSettings:
     def rules(self) -> Rules:
         """What the compiled fit reads."""
         reach = self.radius_px // self.thin
-        offsets = np.arange(-reach, reach + 1, dtype=np.float32) * np.float32(
-            self.thin / self.radius_px
-        )
+        offsets = np.arange(-reach, reach + 1) * (self.thin / self.radius_px)
         return Rules(
-            self.node_px // self.thin,
-            reach,
-            offsets,
-            np.exp(-_TAPER * offsets**2),
-            _RIDGE,
-            np.array(self.scales_px, dtype=np.float32),
-            self.min_samples,
+            node_step=self.node_px // self.thin,
+            reach=reach,
+            offsets=offsets.astype(np.float32),
+            taper=np.exp(-_TAPER * offsets**2).astype(np.float32),
+            ridge=_RIDGE,
+            scales_px=np.array(self.scales_px, dtype=np.float32),
+            min_samples=self.min_samples,
         )
 
 
@@ -72,13 +70,13 @@ def regional_support(
         settings: of the fit.
 
     Returns:
-        (h, w) float32 px; NaN where no node around has a polynomial.
+        (h, w) float32 px; NaN where no node around has a quadratic.
 
     Raises:
         ValueError: sizes that do not fit together.
 
     Source: Cleveland 1979, robust locally weighted regression, with w = 1 / (1 + r^2)^2, each
-    polynomial's residuals being its own. It begins at a median and the scale falls, so near a step
+    quadratic's residuals being its own. It begins at a median and the scale falls, so near a step
     it takes the side that most samples are on.
     """
     settings = settings or RegionalSettings()

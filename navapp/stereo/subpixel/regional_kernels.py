@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float32]
 
 N_TERMS = 6
-# A fit starts from the median of about so many samples.
+# A fit starts from the median of 50 to 99 of the samples, when there are as many.
 _N_START = 50
 # A node counts a little up to the far end of its cells, so that one alone is enough there.
 _LEAST_SHARE = np.float32(1e-6)
@@ -32,13 +32,13 @@ class Rules(NamedTuple):
 
 
 class Known(NamedTuple):
-    """Known samples of one window; only the first n entries hold."""
+    """Known samples of one window of S samples; only the first n entries hold."""
 
     terms: Floats  # (6, S) 1, u, v, u^2, uv, v^2
     value_px: Floats  # (S,)
     weight: Floats  # (S,) as given, times the taper
     residual_px: Floats  # (S,) from a quadratic
-    doubted: Floats  # (S,) weight by that residual
+    robust_weight: Floats  # (S,) weight by that residual
 
 
 @njit(cache=True, nogil=True)
@@ -48,7 +48,7 @@ def fit_rows(
     """Quadratics of the nodes of the rows `first` to `last` (exclusive).
 
     Args:
-        samples_px: (h, w).
+        samples_px: (h, w) samples.
         weights: (h, w), 0 for a sample that is not known.
         rules: of the fit.
         first: row of nodes.
@@ -56,8 +56,7 @@ def fit_rows(
         nodes: (rows, columns, 7) in place: support, which is the mean weight of the samples, 0
             without a quadratic; and its coefficients.
     """
-    # One entry more: what is not known is written as well.
-    size = len(rules.offsets) ** 2 + 1
+    size = len(rules.offsets) ** 2
     known = Known(
         np.ones((N_TERMS, size), np.float32), np.empty(size, np.float32),
         np.empty(size, np.float32), np.empty(size, np.float32), np.empty(size, np.float32),
@@ -73,13 +72,13 @@ def fit_rows(
             node[1] = np.median(known.value_px[: n : max(n // _N_START, 1)])
             for scale_px in rules.scales_px:
                 add_up(known, n, scale_px, node, sums)
-                node[0] = sums[0, 0] / n
-                improve(rules.ridge * np.float32(n), sums, node)
+                node[0] = sums[0, 0] / np.float32(n)
+                improve(rules.ridge, n, sums, node)
 
 
 @njit(cache=True, nogil=True)
 def gather(samples_px: Floats, weights: Floats, rules: Rules, y: int, x: int, known: Known) -> int:
-    """How many samples are known in the window around the sample (y, x); they in place."""
+    """Collect the known samples of the window around the sample (y, x); how many there are."""
     height, width = samples_px.shape
     n, reach = 0, rules.reach
     terms = known.terms
@@ -104,28 +103,28 @@ def add_up(known: Known, n: int, scale_px: np.float32, node: Floats, sums: Float
 
     Args:
         known: samples; residuals and weights in place.
-        n: so many.
+        n: number of samples.
         scale_px: residual that counts a quarter.
         node: (7,) whose coefficients are read.
-        sums: (7, 6) in place, sums of weight times: the products of two terms (lower triangle); in
-            the last row, of each term and the residual.
+        sums: (7, 6) in place, weighted: products of two terms, lower triangle only; in the last
+            row, products of a term and the residual.
     """
-    terms, residual_px, doubted = known.terms, known.residual_px, known.doubted
+    terms, residual_px, robust_weight = known.terms, known.residual_px, known.robust_weight
     for k in range(n):
         residual = known.value_px[k]
         for term in range(N_TERMS):
             residual -= node[1 + term] * terms[term, k]
         doubt = np.float32(1.0) + (residual / scale_px) ** 2
-        residual_px[k], doubted[k] = residual, known.weight[k] / (doubt * doubt)
+        residual_px[k], robust_weight[k] = residual, known.weight[k] / (doubt * doubt)
     for a in range(N_TERMS):
         for b in range(a + 1):
-            sums[a, b] = sum_products(doubted, terms[a], terms[b], n)
-        sums[N_TERMS, a] = sum_products(doubted, terms[a], residual_px, n)
+            sums[a, b] = sum_products(robust_weight, terms[a], terms[b], n)
+        sums[N_TERMS, a] = sum_products(robust_weight, terms[a], residual_px, n)
 
 
-@njit(cache=True, nogil=True, fastmath={"reassoc", "contract"})
+@njit(cache=True, nogil=True, fastmath={"reassoc"})
 def sum_products(a: Floats, b: Floats, c: Floats, n: int) -> np.float32:
-    """Sum of a b c over the first n entries, in any order: several at once."""
+    """Sum of a b c over the first n entries, in any order: the compiler takes several at once."""
     total = np.float32(0.0)
     for k in range(n):
         total += a[k] * b[k] * c[k]
@@ -133,34 +132,34 @@ def sum_products(a: Floats, b: Floats, c: Floats, n: int) -> np.float32:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def improve(ridge: Floats, sums: Floats, node: Floats) -> None:
+def improve(ridge: Floats, n: int, sums: Floats, node: Floats) -> None:
     """Move a node's coefficients to the least squares of its sums.
 
     Square-root-free Cholesky decomposition in place; the right side is a seventh row.
 
     Args:
-        ridge: (6,) added to the diagonal. It draws every coefficient to zero but the level, which
-            only moves less.
+        ridge: (6,) added to the diagonal for each sample. It draws every coefficient to zero but
+            the level, which only moves less.
+        n: number of samples.
         sums: (7, 6) of `add_up`; used up.
         node: (7,) in place.
     """
     for j in range(N_TERMS):
-        sums[j, j] += ridge[j]
+        drawn = ridge[j] * np.float32(n)
+        sums[j, j] += drawn
         if j > 0:
-            sums[N_TERMS, j] -= ridge[j] * node[1 + j]
+            sums[N_TERMS, j] -= drawn * node[1 + j]
     for j in range(N_TERMS):
-        pivot = sums[j, j]
         for k in range(j + 1, N_TERMS):
-            factor = sums[k, j] / pivot if pivot > np.float32(0.0) else np.float32(0.0)
+            factor = sums[k, j] / sums[j, j]
             for m in range(k, N_TERMS + 1):
                 sums[m, k] -= factor * sums[m, j]
     for j in range(N_TERMS - 1, -1, -1):
         left = sums[N_TERMS, j]
         for k in range(j + 1, N_TERMS):
             left -= sums[k, j] * sums[N_TERMS, k]
-        change = left / sums[j, j] if sums[j, j] > np.float32(0.0) else left
-        sums[N_TERMS, j] = change
-        node[1 + j] += change
+        sums[N_TERMS, j] = left / sums[j, j]
+        node[1 + j] += sums[N_TERMS, j]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -199,7 +198,7 @@ def blend_rows(
 
 @njit(cache=True, nogil=True)
 def value_at(node: Floats, u: np.float32, v: np.float32) -> np.float32:
-    """Of a node's quadratic."""
+    """Value of a node's quadratic at (u, v), px."""
     return np.float32(
         node[1] + u * (node[2] + u * node[4] + v * node[5]) + v * (node[3] + v * node[6])
     )
