@@ -31,7 +31,10 @@ class TrackerParts(BimccTracker):
         return Frame(self.meter.rectify(left, right, start, margins), start, Stopwatch())
 
     def find(self, frame: Frame) -> Fit | None:
-        """The fit near the start that the judge ranks first, of all that are offered."""
+        """Of all fits near the start the one that the judge ranks first; None out of view.
+
+        A tracker stops at the first that is good enough.
+        """
         fits = [fit for fit in self.near.find(frame) if fit is not None]
         return min(fits, key=lambda fit: self.verdict(frame, fit).rank, default=None)
 
