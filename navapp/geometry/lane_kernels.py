@@ -18,7 +18,7 @@ from numba import types
 from numba.core import cgutils, errors
 from numba.extending import intrinsic, lower_builtin, models, register_model, type_callable
 
-FLOAT_LANES = 8  # what one wide register of most processors holds
+FLOAT_LANES = 8  # a sum of several powers needs many registers
 WHOLE_LANES = 32
 _INDEX = ir.IntType(32)
 

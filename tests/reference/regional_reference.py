@@ -2,7 +2,7 @@
 
 import numpy as np
 
-N_START = 50
+N_START = 7
 
 
 def regional_reference(samples, weights, shape, settings):
@@ -27,7 +27,7 @@ def fit(u, v, d, given, settings):
     terms = np.stack([np.ones_like(u), u, v, u * u, u * v, v * v])
     ridge = len(d) * np.diag([1e-6, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3])
     coefficients = np.zeros(6)
-    coefficients[0] = np.median(d[:: max(len(d) // N_START, 1)])
+    coefficients[0] = median_of_some(u, v, d, settings)
     for scale in settings.scales_px:
         residual = d - coefficients @ terms
         robust = 1.0 / (1.0 + (residual / scale) ** 2) ** 2
@@ -37,6 +37,15 @@ def fit(u, v, d, given, settings):
         normal = (terms * w) @ terms.T + ridge
         coefficients += np.linalg.solve(normal, (terms * w) @ residual - drawn)
     return coefficients, w.mean()
+
+
+def median_of_some(u, v, d, settings):
+    """Median of the samples at up to seven places of the window each way; 0 without any."""
+    reach = settings.radius_px // settings.thin
+    steps = np.round(np.linspace(0, 2 * reach, N_START)) - reach
+    per_sample = settings.radius_px / settings.thin
+    near = np.isin(np.round(u * per_sample), steps) & np.isin(np.round(v * per_sample), steps)
+    return np.median(d[near]) if near.any() else 0.0
 
 
 def blended(polynomials, support, shape, settings):

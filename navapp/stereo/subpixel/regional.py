@@ -10,12 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.bands import in_row_bands
-from navapp.stereo.subpixel.regional_kernels import N_TERMS, Rules, blend_rows, fit_rows
+from navapp.geometry.lane_kernels import FLOAT_LANES, lanes_for
+from navapp.stereo.subpixel.regional_kernels import Rules, fit_rows
+from navapp.stereo.subpixel.regional_picture_kernels import picture_rows
+from navapp.stereo.subpixel.regional_sample_kernels import Samples, Window, place_rows
 
 _TAPER = 1.5
-# For each known sample: on 1, u, v, u^2, uv, v^2. A quadratic that hangs on few samples may
+# For each known sample: on 1, u, v, u^2, uv, v^2. A polynomial that hangs on few samples may
 # neither tilt nor bend much.
 _RIDGE = np.array([1e-6, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3], dtype=np.float32)
+# Each way; a start needs no more.
+_N_START = 7
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +32,7 @@ class RegionalSettings:
     thin: int = 2  # every thin-th pixel each way is a sample; divides `node_px`
     # residual that counts a quarter; one for each iteration.
     scales_px: tuple[float, ...] = (3.0, 1.5, 0.7, 0.35)
-    min_samples: int = 20  # a node with fewer known samples in its window has no quadratic
+    min_samples: int = 20  # a node with fewer known samples in its window has no polynomial
 
     def __post_init__(self) -> None:
         if not 1 <= self.thin <= self.node_px <= self.radius_px or self.node_px % self.thin:
@@ -36,21 +41,6 @@ class RegionalSettings:
             )
         if not self.scales_px or min(self.scales_px) <= 0.0 or self.min_samples < 1:
             raise ValueError("regional needs scales above 0, at least one, and min_samples above 0")
-
-    @property
-    def rules(self) -> Rules:
-        """What the compiled fit reads."""
-        reach = self.radius_px // self.thin
-        offsets = np.arange(-reach, reach + 1) * (self.thin / self.radius_px)
-        return Rules(
-            node_step=self.node_px // self.thin,
-            reach=reach,
-            offsets=offsets.astype(np.float32),
-            taper=np.exp(-_TAPER * offsets**2).astype(np.float32),
-            ridge=_RIDGE,
-            scales_px=np.array(self.scales_px, dtype=np.float32),
-            min_samples=self.min_samples,
-        )
 
 
 def regional_support(
@@ -70,31 +60,66 @@ def regional_support(
         settings: of the fit.
 
     Returns:
-        (h, w) float32 px; NaN where no node around has a quadratic.
+        (h, w) float32 px; NaN where no node around has a polynomial.
 
     Raises:
         ValueError: sizes that do not fit together.
 
     Source: Cleveland 1979, robust locally weighted regression, with w = 1 / (1 + r^2)^2, each
-    quadratic's residuals being its own. It begins at a median and the scale falls, so near a step
+    polynomial's residuals being its own. It begins at a median and the scale falls, so near a step
     it takes the side that most samples are on.
     """
     settings = settings or RegionalSettings()
     expected = tuple(-(-size // settings.thin) for size in shape)
     if samples_px.shape != expected or weights.shape != expected:
         raise ValueError("samples and weights need the size of the map, thinned")
-    side, rules = settings.node_px, settings.rules
+    side = settings.node_px
     n_rows, n_columns = ((size - 1) // side + 2 for size in shape)
-    nodes = np.empty((n_rows, n_columns, 1 + N_TERMS), dtype=np.float32)
-    samples_px = np.ascontiguousarray(samples_px, dtype=np.float32)
-    weights = np.where(np.isfinite(samples_px), weights, np.float32(0.0)).astype(np.float32)
+    nodes = np.empty((n_rows, 7, lanes_for(n_columns, FLOAT_LANES)), dtype=np.float32)
+    samples = _samples(samples_px, weights, nodes.shape, settings)
+    window, rules = _window(samples, settings), _rules(settings)
     in_row_bands(
         n_rows * side,
         lambda rows: fit_rows(
-            samples_px, weights, rules, -(-rows[0] // side), -(-rows[1] // side), nodes
+            samples, window, rules, -(-rows[0] // side), -(-rows[1] // side), nodes
         ),
     )
-    surface_px = np.empty(shape, dtype=np.float32)
-    radius_px = settings.radius_px
-    in_row_bands(shape[0], lambda rows: blend_rows(nodes, side, radius_px, *rows, surface_px))
-    return surface_px
+    picture = np.empty(shape, dtype=np.float32)
+    unit = np.float32(side / settings.radius_px)
+    in_row_bands(shape[0], lambda rows: picture_rows(nodes, side, unit, *rows, picture))
+    return picture
+
+
+def _samples(
+    samples_px: NDArray[np.float32],
+    weights: NDArray[np.float32],
+    nodes: tuple[int, ...],
+    settings: RegionalSettings,
+) -> Samples:
+    """The samples in planes for nodes (rows, 7, columns)."""
+    spacing, reach = settings.node_px // settings.thin, settings.radius_px // settings.thin
+    margin = -(-reach // spacing)
+    stride = nodes[2] + 2 * margin
+    size = (spacing * (nodes[0] - 1) + 2 * reach + 1) * spacing * stride
+    values, known = np.zeros((2, size), dtype=np.float32)
+    samples = Samples(values, known, spacing * stride, stride, spacing, reach, margin)
+    place_rows(
+        np.ascontiguousarray(samples_px, dtype=np.float32),
+        np.ascontiguousarray(weights, dtype=np.float32),
+        0, len(samples_px), samples,
+    )  # fmt: skip
+    return samples
+
+
+def _window(samples: Samples, settings: RegionalSettings) -> Window:
+    steps = np.arange(-samples.reach, samples.reach + 1)
+    u = (steps * settings.thin / settings.radius_px).astype(np.float32)
+    across = steps % samples.spacing * samples.stride + steps // samples.spacing + samples.margin
+    taps = np.unique(np.round(np.linspace(0, 2 * samples.reach, _N_START)).astype(int))
+    start = (taps[:, None] * samples.width + across[taps]).ravel()
+    return Window(across, u, np.exp(-np.float32(_TAPER) * u * u), start)
+
+
+def _rules(settings: RegionalSettings) -> Rules:
+    scales = np.array(settings.scales_px, dtype=np.float32)
+    return Rules(scales, _RIDGE, np.float32(settings.min_samples))

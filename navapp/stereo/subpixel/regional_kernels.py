@@ -1,204 +1,187 @@
-"""Compiled robust quadratics around the nodes of a grid, and their blend into one surface.
+"""Compiled robust quadratics around the nodes of a grid, eight neighbouring nodes at once."""
 
-A quadratic is a sum over 1, u, v, u^2, uv, v^2: u to the right and v down from its node, in window
-radii.
-"""
-
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float32]
+from navapp.geometry.lane_kernels import FLOAT_LANES, load, spread, store, where_positive
+from navapp.stereo.subpixel.regional_sample_kernels import Samples, Window, count_known, medians
 
-N_TERMS = 6
-# A fit starts from the median of 50 to 99 of the samples, when there are as many.
-_N_START = 50
-# A node counts a little up to the far end of its cells, so that one alone is enough there.
-_LEAST_SHARE = np.float32(1e-6)
+# 1, u, v, u^2, uv, v^2.
+_N_TERMS = 6
+_POWER_OF_U = (0, 1, 0, 2, 1, 0)
+_POWER_OF_V = (0, 0, 1, 0, 1, 2)
+# What eight nodes have side by side in one array: polynomials; sums of weight, and of weight times
+# residual, by power of u and of v; the equations.
+_N_POWERS, _N_RIGHT_POWERS = 5, 3
+_MOMENTS = _N_TERMS
+_RIGHT = _MOMENTS + _N_POWERS * _N_POWERS
+_BELOW = _RIGHT + _N_RIGHT_POWERS * _N_RIGHT_POWERS
+_SCALED = _BELOW + (_N_TERMS + 1) * _N_TERMS
+_N_STATE = _SCALED + (_N_TERMS + 1) * _N_TERMS
 
 
 class Rules(NamedTuple):
-    """How a quadratic is fitted; lengths along the picture in samples."""
+    """How the fit works."""
 
-    node_step: int  # from node to node
-    reach: int  # from a node to the rim of its window
-    offsets: Floats  # (n,) u, or v, of the samples from one rim of the window to the other
-    taper: Floats  # (n,) what each counts by that
-    ridge: Floats  # (6,) added to the diagonal for each known sample
-    scales_px: Floats  # residual that counts a quarter, by iteration
-    min_samples: int  # known ones, for a quadratic
-
-
-class Known(NamedTuple):
-    """Known samples of one window of S samples; only the first n entries hold."""
-
-    terms: Floats  # (6, S) 1, u, v, u^2, uv, v^2
-    value_px: Floats  # (S,)
-    weight: Floats  # (S,) as given, times the taper
-    residual_px: Floats  # (S,) from a quadratic
-    robust_weight: Floats  # (S,) weight by that residual
+    scales_px: NDArray[np.float32]  # residual that counts a quarter, by iteration
+    ridge: NDArray[np.float32]  # (6,) added to the diagonal for each known sample
+    min_samples: np.float32  # for a polynomial
 
 
 @njit(cache=True, nogil=True)
 def fit_rows(
-    samples_px: Floats, weights: Floats, rules: Rules, first: int, last: int, nodes: Floats
+    samples: Samples,
+    window: Window,
+    rules: Rules,
+    first: int,
+    last: int,
+    nodes: NDArray[np.float32],
 ) -> None:
-    """Quadratics of the nodes of the rows `first` to `last` (exclusive).
+    """Polynomials of the nodes of the rows `first` to `last` (exclusive).
 
     Args:
-        samples_px: (h, w) samples.
-        weights: (h, w), 0 for a sample that is not known.
+        samples: in planes.
+        window: of a node.
         rules: of the fit.
         first: row of nodes.
         last: row after the last.
-        nodes: (rows, columns, 7) in place: support, which is the mean weight of the samples, 0
-            without a quadratic; and its coefficients.
+        nodes: (rows, 7, columns) in place: support, and support times the coefficients of 1, u, v,
+            u^2, uv, v^2; columns a multiple of `FLOAT_LANES`.
     """
-    size = len(rules.offsets) ** 2
-    known = Known(
-        np.ones((N_TERMS, size), np.float32), np.empty(size, np.float32),
-        np.empty(size, np.float32), np.empty(size, np.float32), np.empty(size, np.float32),
-    )  # fmt: skip
-    sums = np.empty((N_TERMS + 1, N_TERMS), np.float32)
+    n_columns = nodes.shape[2]
+    told = nodes.ravel()
+    state = np.zeros(_N_STATE * FLOAT_LANES, np.float32)
+    ranked = np.empty(len(window.start) * FLOAT_LANES, np.float32)
+    counts = np.empty(FLOAT_LANES, np.float32)
     for j in range(first, last):
-        for i in range(nodes.shape[1]):
-            node = nodes[j, i]
-            node[:] = np.float32(0.0)
-            n = gather(samples_px, weights, rules, j * rules.node_step, i * rules.node_step, known)
-            if n < rules.min_samples:
-                continue
-            node[1] = np.median(known.value_px[: n : max(n // _N_START, 1)])
-            for scale_px in rules.scales_px:
-                add_up(known, n, scale_px, node, sums)
-                node[0] = sums[0, 0] / np.float32(n)
-                improve(rules.ridge, n, sums, node)
-
-
-@njit(cache=True, nogil=True)
-def gather(samples_px: Floats, weights: Floats, rules: Rules, y: int, x: int, known: Known) -> int:
-    """Collect the known samples of the window around the sample (y, x); how many there are."""
-    height, width = samples_px.shape
-    n, reach = 0, rules.reach
-    terms = known.terms
-    for row in range(max(y - reach, 0), min(y + reach + 1, height)):
-        v, taper = rules.offsets[row - y + reach], rules.taper[row - y + reach]
-        for column in range(max(x - reach, 0), min(x + reach + 1, width)):
-            weight = weights[row, column]
-            # Written in any case, and kept if known: branches that cannot be foreseen are slow.
-            terms[1, n], terms[2, n] = rules.offsets[column - x + reach], v
-            known.value_px[n] = samples_px[row, column]
-            known.weight[n] = weight * taper * rules.taper[column - x + reach]
-            n += int(weight > np.float32(0.0))
-    for k in range(n):
-        u, v = terms[1, k], terms[2, k]
-        terms[3, k], terms[4, k], terms[5, k] = u * u, u * v, v * v
-    return n
+        for i in range(0, n_columns, FLOAT_LANES):
+            begin = j * samples.spacing * samples.width + i
+            count_known(samples, window, begin, counts)
+            if counts.max() >= rules.min_samples:
+                state[: _N_TERMS * FLOAT_LANES] = np.float32(0.0)
+                medians(samples, window, begin, ranked, state)
+                for scale in rules.scales_px:
+                    _add_window(samples, window, begin, scale, state)
+                    _solve(rules.ridge, counts, state)
+            _tell(state, counts, rules.min_samples, n_columns, told[7 * j * n_columns + i :])
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def add_up(known: Known, n: int, scale_px: np.float32, node: Floats, sums: Floats) -> None:
-    """Normal equations of a window, each sample weighed by its residual from the node's quadratic.
-
-    Args:
-        known: samples; residuals and weights in place.
-        n: number of samples.
-        scale_px: residual that counts a quarter.
-        node: (7,) whose coefficients are read.
-        sums: (7, 6) in place, weighted: products of two terms, lower triangle only; in the last
-            row, products of a term and the residual.
-    """
-    terms, residual_px, robust_weight = known.terms, known.residual_px, known.robust_weight
-    for k in range(n):
-        residual = known.value_px[k]
-        for term in range(N_TERMS):
-            residual -= node[1 + term] * terms[term, k]
-        doubt = np.float32(1.0) + (residual / scale_px) ** 2
-        residual_px[k], robust_weight[k] = residual, known.weight[k] / (doubt * doubt)
-    for a in range(N_TERMS):
-        for b in range(a + 1):
-            sums[a, b] = sum_products(robust_weight, terms[a], terms[b], n)
-        sums[N_TERMS, a] = sum_products(robust_weight, terms[a], residual_px, n)
-
-
-@njit(cache=True, nogil=True, fastmath={"reassoc"})
-def sum_products(a: Floats, b: Floats, c: Floats, n: int) -> np.float32:
-    """Sum of a b c over the first n entries, in any order: the compiler takes several at once."""
-    total = np.float32(0.0)
-    for k in range(n):
-        total += a[k] * b[k] * c[k]
-    return total
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def improve(ridge: Floats, n: int, sums: Floats, node: Floats) -> None:
-    """Move a node's coefficients to the least squares of its sums.
-
-    Square-root-free Cholesky decomposition in place; the right side is a seventh row.
-
-    Args:
-        ridge: (6,) added to the diagonal for each sample. It draws every coefficient to zero but
-            the level, which only moves less.
-        n: number of samples.
-        sums: (7, 6) of `add_up`; used up.
-        node: (7,) in place.
-    """
-    for j in range(N_TERMS):
-        drawn = ridge[j] * np.float32(n)
-        sums[j, j] += drawn
-        if j > 0:
-            sums[N_TERMS, j] -= drawn * node[1 + j]
-    for j in range(N_TERMS):
-        for k in range(j + 1, N_TERMS):
-            factor = sums[k, j] / sums[j, j]
-            for m in range(k, N_TERMS + 1):
-                sums[m, k] -= factor * sums[m, j]
-    for j in range(N_TERMS - 1, -1, -1):
-        left = sums[N_TERMS, j]
-        for k in range(j + 1, N_TERMS):
-            left -= sums[k, j] * sums[N_TERMS, k]
-        sums[N_TERMS, j] = left / sums[j, j]
-        node[1 + j] += sums[N_TERMS, j]
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def blend_rows(
-    nodes: Floats, node_px: int, radius_px: int, first: int, last: int, surface_px: Floats
+def _add_window(
+    samples: Samples, window: Window, begin: int, scale: np.float32, state: NDArray[np.float32]
 ) -> None:
-    """The surface at the pixels of the rows `first` to `last` (exclusive).
-
-    Each pixel is the mean of what the four nodes around say, by bilinear weight times support.
-
-    Args:
-        nodes: (rows, columns, 7) of `fit_rows`.
-        node_px: from node to node.
-        radius_px: of the window.
-        first: row.
-        last: row after the last.
-        surface_px: (h, w) in place; NaN where no node around has a quadratic.
-    """
-    side, radius, one = np.float32(node_px), np.float32(radius_px), np.float32(1.0)
-    for y in range(first, last):
-        row, below = divmod(y, node_px)
-        for x in range(surface_px.shape[1]):
-            column, right = divmod(x, node_px)
-            total, count = np.float32(0.0), np.float32(0.0)
-            for j in range(2):
-                v = np.float32(below - j * node_px)
-                for i in range(2):
-                    u = np.float32(right - i * node_px)
-                    node = nodes[row + j, column + i]
-                    across, down = one - abs(u) / side, one - abs(v) / side
-                    share = node[0] * (across + _LEAST_SHARE) * (down + _LEAST_SHARE)
-                    count += share
-                    total += share * value_at(node, u / radius, v / radius)
-            surface_px[y, x] = total / count
+    """Sums over the windows, weighed by the residual against the polynomials."""
+    zero, one = spread(np.float32(0.0)), spread(np.float32(1.0))
+    per_px = spread(np.float32(1.0) / scale)
+    for k in range(_MOMENTS, _BELOW):
+        store(state, k * FLOAT_LANES, zero)
+    bend = load(state, 3 * FLOAT_LANES)
+    for j in range(len(window.offsets)):
+        v, taper = spread(window.offsets[j]), spread(window.taper[j])
+        level = load(state, 0) + v * (
+            load(state, 2 * FLOAT_LANES) + v * load(state, 5 * FLOAT_LANES)
+        )
+        slope = load(state, 1 * FLOAT_LANES) + v * load(state, 4 * FLOAT_LANES)
+        s0, s1, s2, s3, s4 = zero, zero, zero, zero, zero
+        r0, r1, r2 = zero, zero, zero
+        place = begin + j * samples.width
+        for i in range(len(window.offsets)):
+            u = spread(window.offsets[i])
+            at = place + window.across[i]
+            residual = load(samples.values, at) - (level + u * (slope + u * bend))
+            ratio = residual * per_px
+            doubt = one + ratio * ratio
+            w = load(samples.weights, at) * spread(window.taper[i]) / (doubt * doubt)
+            s0, r, w = s0 + w, w * residual, w * u
+            r0, r = r0 + r, r * u
+            r1, r = r1 + r, r * u
+            r2 = r2 + r
+            s1, w = s1 + w, w * u
+            s2, w = s2 + w, w * u
+            s3, w = s3 + w, w * u
+            s4 = s4 + w
+        _add_row((s0, s1, s2, s3, s4), v, taper, _MOMENTS, state)
+        _add_row((r0, r1, r2), v, taper, _RIGHT, state)
 
 
 @njit(cache=True, nogil=True)
-def value_at(node: Floats, u: np.float32, v: np.float32) -> np.float32:
-    """Value of a node's quadratic at (u, v), px."""
-    return np.float32(
-        node[1] + u * (node[2] + u * node[4] + v * node[5]) + v * (node[3] + v * node[6])
-    )
+def _add_row(
+    row: tuple[Any, ...], v: Any, taper: Any, sums: int, state: NDArray[np.float32]
+) -> None:
+    """Add the sums of a row, by power of u, times powers of v to those of the window."""
+    n, factor = len(row), taper
+    for q in range(n):
+        for p in range(n - q):
+            at = (sums + n * q + p) * FLOAT_LANES
+            store(state, at, load(state, at) + factor * row[p])
+        factor = factor * v
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _solve(
+    ridge: NDArray[np.float32], counts: NDArray[np.float32], state: NDArray[np.float32]
+) -> None:
+    """Improve the polynomials: square-root-free Cholesky, the right side is a seventh row."""
+    one, count = spread(np.float32(1.0)), load(counts, 0)
+    for j in range(_N_TERMS):
+        p, q = _POWER_OF_U[j], _POWER_OF_V[j]
+        for k in range(j, _N_TERMS):
+            moment = _MOMENTS + _N_POWERS * (q + _POWER_OF_V[k]) + p + _POWER_OF_U[k]
+            store(state, _below(k, j), load(state, moment * FLOAT_LANES))
+        # The ridge draws all to zero but the level, which only moves less.
+        small = spread(ridge[j]) * count
+        drawn = load(state, (_RIGHT + _N_RIGHT_POWERS * q + p) * FLOAT_LANES)
+        if j > 0:
+            drawn = drawn - small * load(state, j * FLOAT_LANES)
+        store(state, _below(j, j), load(state, _below(j, j)) + small)
+        store(state, _below(_N_TERMS, j), drawn)
+        for k in range(j, _N_TERMS + 1):
+            left = load(state, _below(k, j))
+            for m in range(j):
+                left = left - load(state, _below(k, m)) * load(state, _scale(j, m))
+            store(state, _below(k, j), left)
+        pivot = load(state, _below(j, j))
+        inverse = where_positive(pivot, one / pivot, one)
+        for k in range(j + 1, _N_TERMS + 1):
+            store(state, _scale(k, j), load(state, _below(k, j)) * inverse)
+    for j in range(_N_TERMS - 1, -1, -1):
+        change = load(state, _scale(_N_TERMS, j))
+        for k in range(j + 1, _N_TERMS):
+            change = change - load(state, _scale(k, j)) * load(state, _scale(_N_TERMS, k))
+        store(state, _scale(_N_TERMS, j), change)
+        store(state, j * FLOAT_LANES, load(state, j * FLOAT_LANES) + change)
+
+
+@njit(cache=True, nogil=True)
+def _below(k: int, j: int) -> int:
+    """Where L D is."""
+    return (_BELOW + k * _N_TERMS + j) * FLOAT_LANES
+
+
+@njit(cache=True, nogil=True)
+def _scale(k: int, j: int) -> int:
+    """Where L is; its last row is the answer."""
+    return (_SCALED + k * _N_TERMS + j) * FLOAT_LANES
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _tell(
+    state: NDArray[np.float32],
+    counts: NDArray[np.float32],
+    min_samples: np.float32,
+    n_columns: int,
+    told: NDArray[np.float32],
+) -> None:
+    """Hand out support, the mean weight, and polynomials; no support with too few samples."""
+    for k in range(FLOAT_LANES):
+        if counts[k] >= min_samples:
+            told[k] = state[_MOMENTS * FLOAT_LANES + k] / counts[k]
+        else:
+            told[k] = np.float32(0.0)
+    support, zero = load(told, 0), spread(np.float32(0.0))
+    for term in range(_N_TERMS):
+        told_term = where_positive(support, support * load(state, term * FLOAT_LANES), zero)
+        store(told, (1 + term) * n_columns, told_term)
