@@ -30,6 +30,8 @@ _LEAST_PICTURES, _LEAST_BLOCKS, _LEAST_SCORED = 30, 4, 10
 _MOST_FIT_MM = 5.0
 # Another offset that fits nearly as well: the motion repeats itself.
 _UNLIKE = 1.3
+# Starts that end in the same solution differ by where the solver stopped.
+_ALIKE = 1.0 + 1e-6
 _OUTLIER_MM = 1.0
 
 
@@ -240,17 +242,18 @@ def _find_seen(start: _Start, used: BonePoses) -> FloatArray:
 def _choose(
     found: list[tuple[_Start, FloatArray, float]],
 ) -> tuple[_Start, FloatArray, float]:
-    ranked = sorted(found, key=lambda one: one[2])
-    if not ranked:
+    if not found:
         raise _undetermined("no time offset lets half of the recording lie in the tracker's time")
-    best = ranked[0]
+    least_mm = min(fit_mm for _, _, fit_mm in found)
+    # Of those that end alike the likeliest offset: others came through seconds that are scored.
+    best = next(one for one in found if one[2] <= _ALIKE * least_mm)
     if best[2] > _MOST_FIT_MM:
         raise _undetermined(
             f"the two motions differ by {best[2]:.1f} mm at the best time offset; is it the "
             "same recording, and did marker and tracker stay fixed"
         )
     lag_s = best[0].lag_s + best[1][12]
-    for start, unknowns, fit_mm in ranked[1:]:
+    for start, unknowns, fit_mm in found:
         is_other = abs(start.lag_s + unknowns[12] - lag_s) > 0.1
         if is_other and fit_mm < _UNLIKE * best[2]:
             raise _undetermined(
