@@ -166,11 +166,12 @@ class Scene:
     @cached_property
     def _order(self) -> tuple[FloatMap, FloatMap, NDArray[np.bool_]]:
         """(h, w) over `box`: weight of guides on the bone, depth of what is nearest, is hidden."""
-        weight = np.full(self.bone_mm.shape, self.guess_weight, dtype=np.float32)
-        is_hidden = np.zeros(weight.shape, dtype=np.bool_)
+        shape = self.bone_mm.shape
         if self.seen is None:
-            return weight, self.bone_mm, is_hidden
-        nearest_mm = np.empty_like(weight)
+            weight = np.full(shape, self.guess_weight, dtype=np.float32)
+            return weight, self.bone_mm, np.zeros(shape, dtype=np.bool_)
+        weight, nearest_mm = np.empty((2, *shape), dtype=np.float32)
+        is_hidden = np.empty(shape, dtype=np.bool_)
         find_weights(
             self.bone_mm, self.seen.depth_mm, self.seen.is_guess,
             (self.box.x % 2, self.box.y % 2), self.seen.in_front, TISSUE_MM, self._aside_mm,

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.rectification import RectifiedGeometry
-from navapp.values import DisparityMap, Origin
+from navapp.values import DisparityMap
 
 
 class Optics(NamedTuple):
@@ -27,7 +27,7 @@ class DepthMap(NamedTuple):
     @classmethod
     def of(cls, geometry: RectifiedGeometry, found: DisparityMap) -> Self:
         """The matched pixels of a map of disparity in a rectified pair."""
-        is_known = (found.origin == Origin.MATCHED) & (found.disparity_px > 0.0)
+        is_known = found.is_matched & (found.disparity_px > 0.0)
         depth_mm = np.zeros(found.disparity_px.shape, dtype=np.float32)
         scale = geometry.focal_px * geometry.baseline_mm
         np.divide(scale, found.disparity_px, out=depth_mm, where=is_known)

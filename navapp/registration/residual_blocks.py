@@ -8,19 +8,15 @@ from numpy.typing import NDArray
 
 from navapp.geometry.transform import FloatArray
 from navapp.registration.information import leaves_direction_free
+from navapp.registration.joining_kernels import FurtherBlock, SurfaceBlock, solve_joined
 from navapp.registration.step_kernels import noise_under_kernel_mm2
 from navapp.values import PoseEstimate, Reason, SizedPose
 
 # All chosen, but where a source is named.
 # A residual further off than this, in sigma of itself and of the pose, belongs to something else.
 _GATE_SIGMAS = 3.0
-# Width of the kernel in sigma: 97 % of the efficiency of least squares (as `BimccSettings`).
-_KERNEL_SIGMAS = 2.5
-_ROUNDS = 6
 # Chi-square of 6 degrees of freedom at 95 %: blocks that pull further apart are not joined.
 _APART = 12.59
-# What a block's residuals say of its noise counts beside what it claims, which counts as so many.
-_CLAIM_COUNT = 6.0
 # Those residuals of a wrong pose that happen to be small agree with it: they must not speak for the
 # others. Of right ones most are near (`python -m tests.bench.outline`), fewer where tissue covers
 # the rim.
@@ -63,6 +59,14 @@ class ResidualBlock:
         is_near = (self.residual - rows @ step) ** 2 < _GATE_SIGMAS**2 * expected
         count = 1.0 / self.n_sharing
         return NearResiduals(is_near, float(count.sum()), float(count[is_near].sum()))
+
+    def only(self, near: "NearResiduals", rows: FloatArray) -> FurtherBlock:
+        """Those residuals that a pose allows, with the rows (N, k) of all."""
+        kept = np.flatnonzero(near.is_near)
+        return FurtherBlock(
+            rows[kept], self.residual[kept], self.variance[kept], self.n_sharing[kept],
+            self.common_sd,
+        )  # fmt: skip
 
 
 class NearResiduals(NamedTuple):
@@ -121,11 +125,11 @@ def join(
     # What the surface's residuals show of the variance that they claim, at most all of it.
     ratio2 = max((estimate.rms_mm / estimate.expected_rms_mm) ** 2, _LEAST_SQUARED_RATIO)
     scale = min(float(noise_under_kernel_mm2(ratio2, 1.0, kernel_sigmas)), 1.0)
-    surface = _Surface(np.zeros(6), estimate.covariance, scale, noise_variance_ratio)
+    surface = SurfaceBlock(np.zeros(6), np.array(estimate.covariance), scale, noise_variance_ratio)
     near = block.find_near(block.jacobian, surface.step, surface.covariance)
     joined = None
     if not (near.is_other or near.is_few):
-        joined = _solve_joined(surface, block.jacobian, block, near.is_near, surface.step)
+        joined = solve_joined(surface, block.only(near, block.jacobian), surface.step)
         if joined.step @ np.linalg.solve(estimate.covariance, joined.step) > _APART:
             joined = None
     step = surface.step if joined is None else joined.step
@@ -143,25 +147,8 @@ def join(
     )
 
 
-class _Surface(NamedTuple):
-    """What the surface says of k unknowns."""
-
-    step: FloatArray  # (k,)
-    covariance: FloatArray  # (k, k)
-    scale: float  # variance of its residuals over the one that they claim
-    noise_variance_ratio: float  # as of `join`
-
-
-class _Joined(NamedTuple):
-    """Where surface and block agree."""
-
-    step: FloatArray  # (k,)
-    covariance: FloatArray  # (k, k)
-    cost: float  # what is minimised: half of the squares of both, those of the block under a kernel
-
-
 def _join_size(
-    sized: SizedPose, of_pose: _Surface, block: ResidualBlock, pose_step: FloatArray
+    sized: SizedPose, of_pose: SurfaceBlock, block: ResidualBlock, pose_step: FloatArray
 ) -> SizedPose:
     """The pose in another size on which both agree; the surface's where the block says little.
 
@@ -169,64 +156,14 @@ def _join_size(
     for from the size that the surface tells, and from the model's own at the pose (6,) that both
     gave it: the better of the two minima counts.
     """
-    surface = of_pose._replace(step=sized.step, covariance=sized.covariance)
+    step, covariance = np.array(sized.step), np.array(sized.covariance)
+    surface = of_pose._replace(step=step, covariance=covariance)
     rows = block.sized_jacobian(sized)
     near = block.find_near(rows, surface.step, surface.covariance)
     if near.is_few or near.is_other:
         return sized.scale_noise(surface.noise_variance_ratio)
     starts = surface.step, np.append(pose_step, 0.0)
-    found = (_solve_joined(surface, rows, block, near.is_near, start) for start in starts)
+    allowed = block.only(near, rows)
+    found = (solve_joined(surface, allowed, start) for start in starts)
     best = min(found, key=lambda one: one.cost)
     return replace(sized, step=best.step, covariance=best.covariance)
-
-
-def _solve_joined(
-    surface: _Surface,
-    rows: FloatArray,
-    block: ResidualBlock,
-    is_near: NDArray[np.bool_],
-    start: FloatArray,
-) -> _Joined:
-    """(k,) unknowns on which surface and block agree.
-
-    Args:
-        surface: says so much of the unknowns.
-        rows: (N, k) how the block's predictions grow with the unknowns.
-        block: joined.
-        is_near: (N,) those of its residuals that take part.
-        start: (k,) of the search.
-    """
-    residual, variance = block.residual[is_near], block.variance[is_near]
-    n_sharing, k = block.n_sharing[is_near], len(surface.step)
-    # The offset that the block's residuals have in common is one unknown more.
-    rows = np.column_stack([rows[is_near], np.ones(len(residual))])
-    known, offset = np.zeros((k + 1, k + 1)), np.zeros((k + 1, k + 1))
-    known[:k, :k], offset[k, k] = np.linalg.inv(surface.covariance), 1.0 / block.common_sd**2
-    expected, step = np.append(surface.step, 0.0), np.append(start, 0.0)
-    by_surface = known @ expected / surface.scale
-
-    def weigh(step: FloatArray) -> tuple[FloatArray, FloatArray]:
-        misfit2 = (residual - rows @ step) ** 2 / variance
-        return misfit2, np.exp(-0.5 * misfit2 / _KERNEL_SIGMAS**2)
-
-    for _ in range(_ROUNDS):
-        misfit2, kernel = weigh(step)
-        count = kernel / n_sharing
-        # What the residuals show of their claimed variance, drawn to 1 when they are few.
-        n, squares = float(count.sum()), float((count * misfit2).sum())
-        shown = float(noise_under_kernel_mm2(squares, n, _KERNEL_SIGMAS))
-        scale = (_CLAIM_COUNT + n * shown) / (_CLAIM_COUNT + n)
-        weighted = rows.T * (count / variance)
-        information = weighted @ rows
-        normal = known / surface.scale + offset + information / scale
-        both = by_surface + weighted @ residual / scale
-        step = np.asarray(np.linalg.solve(normal, both), dtype=np.float64)
-    inverse = np.linalg.inv(normal)
-    # A block that shows more noise than it claims is believed.
-    noise = surface.noise_variance_ratio * known / surface.scale**2 + offset
-    noise += information * max(scale, 1.0) / scale**2
-    covariance = (inverse @ noise @ inverse)[:k, :k]
-    lost = _KERNEL_SIGMAS**2 * (1.0 - weigh(step)[1]) / n_sharing
-    apart = step - expected
-    cost = 0.5 * float(apart @ (known / surface.scale + offset) @ apart) + float(lost.sum())
-    return _Joined(step[:k], 0.5 * (covariance + covariance.T), cost)

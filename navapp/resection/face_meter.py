@@ -28,7 +28,6 @@ from navapp.values import (
     BoneModel,
     DisparityMap,
     MeasuredFace,
-    Origin,
     PoseEstimate,
     ResectionPlane,
 )
@@ -220,7 +219,7 @@ class FaceMeter:
         start: FloatArray,
         reach_px: float,
     ) -> DisparityPlane | None:
-        rows, columns = np.nonzero(mask & (found.origin == Origin.MATCHED))
+        rows, columns = np.nonzero(mask & found.is_matched)
         thin = (rows % _STRIDE_PX == 0) & (columns % _STRIDE_PX == 0)
         rows, columns = rows[thin], columns[thin]
         if len(rows) * _STRIDE_PX**2 < LEAST_PIXELS:

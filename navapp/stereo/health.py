@@ -12,7 +12,7 @@ import numpy as np
 from navapp.geometry.box import Box
 from navapp.geometry.rectification import Image, RectifiedPair
 from navapp.stereo.health_kernels import measure_rows
-from navapp.values import DisparityMap, Origin
+from navapp.values import DisparityMap
 
 # Windows of 9 pixels that do not overlap, so that their noise is their own.
 _STRIDE_PX, _RADIUS_PX = 10, 4
@@ -85,8 +85,7 @@ def _rows(pair: RectifiedPair, found: DisparityMap) -> tuple[float, float, int, 
 
     Steps are repeated from the common offset: single windows are too noisy to follow.
     """
-    n_matched = np.count_nonzero(found.origin == Origin.MATCHED)
-    stride_px = max(_STRIDE_PX, math.ceil((n_matched / _MOST_POINTS) ** 0.5))
+    stride_px = max(_STRIDE_PX, math.ceil((found.n_matched / _MOST_POINTS) ** 0.5))
     answers = np.empty((2 * _MOST_POINTS, 3))
     offset_px = 0.0
     for _ in range(_MOST_STEPS):
@@ -119,10 +118,11 @@ def _picture_health(picture: Image, box: Box) -> PictureHealth:
     ]
     if part.size == 0 or part.shape[0] < 2:
         return PictureHealth(1.0, 0.0, 0.0)
-    step = np.diff(part.astype(np.float32), axis=0).ravel()
+    part = part.astype(np.float32)
+    step = (part[1:] - part[:-1]).ravel()
     rms = math.sqrt(float(step @ step) / len(step))
     return PictureHealth(
-        float((part < _DARK_LEVEL).mean()),
-        float((part >= _SATURATED_LEVEL).mean()),
+        np.count_nonzero(part < _DARK_LEVEL) / part.size,
+        np.count_nonzero(part >= _SATURATED_LEVEL) / part.size,
         rms / max(float(part.mean()), 1.0),
     )

@@ -19,14 +19,14 @@ from navapp.tracking.agreement_kernels import (
     NEARER,
     classify_pixels,
 )
-from navapp.values import DisparityMap, Origin
+from navapp.values import DisparityMap
 
 # All chosen. Smaller regions of nearer or further pixels do not count.
 _LEAST_REGION_PX2 = 25
 # Matching blurs depth over the model's rim, and what lies beside the bone is further away.
 _RIM_PX = 4
-# Neighbours share their errors: every second row and column tells the spread as well.
-_SPREAD_STRIDE_PX = 2
+# Windows of eleven pixels share their errors: every fourth row and column tells the spread as well.
+_SPREAD_STRIDE_PX = 4
 # So much of the model may show reflected lamps; as much as may be seen through at a right pose
 # (`verdict.RULES`). Without a limit, a bone that was cut unknown to the plan would fit where
 # highlights cover its face.
@@ -55,7 +55,7 @@ def compare(
             image behind the surface. That much of the model, `_MOST_REFLECTED` at most, does not
             count as seen through.
     """
-    shape, is_matched = view.face_index.shape, measured.origin == Origin.MATCHED
+    shape, is_matched = view.face_index.shape, measured.is_matched
     if coarse_px is None:
         coarse_px = np.full(shape, np.nan, dtype=np.float32)
     classes, deviation, sigma, n_visible, n_agreeing = classify_pixels(

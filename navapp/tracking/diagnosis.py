@@ -6,6 +6,7 @@ image fit them?
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -122,5 +123,5 @@ def mirror_measurement(measured: Measurement, geometry: RectifiedGeometry) -> Me
         round(2.0 * geometry.centre_x_px) - right_most,
         found.y,
     )
-    cloud = mirrored.reproject(geometry, measured.cloud.stride_px)
-    return replace(measured, disparity=mirrored, cloud=cloud)
+    make_cloud = partial(mirrored.reproject, geometry, measured.cloud.stride_px)
+    return replace(measured, disparity=mirrored, make_cloud=make_cloud)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from navapp.geometry.transform import RigidTransform
 from navapp.registration import fit_bimcc, fit_pose
-from navapp.tracking.frame import MODEL_SETTINGS, Fit, Frame, OnMeasured, ignore
+from navapp.tracking.frame import MODEL_SETTINGS, REST_SETTINGS, Fit, Frame, OnMeasured, ignore
 from navapp.tracking.surface_meter import NEAR_BOX, Expected, Measurement, SurfaceMeter
 from navapp.values import Reason
 
@@ -75,7 +75,9 @@ class Follower:
             rested = None
             if is_near:
                 on_measured(measured, pose)
-                estimate = fit_bimcc(measured.scene, model, pose, MODEL_SETTINGS)
+                rests = n_rounds > 1 and moved_mm < settings.near_mm
+                kernel = REST_SETTINGS if rests else MODEL_SETTINGS
+                estimate = fit_bimcc(measured.scene, model, pose, kernel)
                 if Reason.TOO_FEW_POINTS not in estimate.reasons:
                     fit, rested = Fit(estimate, measured), estimate.camera_from_bone
             elif measured.matched_fraction >= least_fraction:

@@ -8,7 +8,7 @@ from navapp.geometry.halves import double, half_box
 from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.zbuffer import RenderedView
 from navapp.tracking.foreground_kernels import vote_on_guesses
-from navapp.values import DisparityMap, Foreground, Origin, Surroundings
+from navapp.values import DisparityMap, Foreground, Surroundings
 
 # Nearer than the nearest bone within so many pixels, by so much: chosen on simulated knees
 # (`python -m tests.bench.foreground`). A matching window hangs over the bone's rim by about as far.
@@ -44,7 +44,7 @@ def find_foreground(
     limit_px = np.full((own.height, own.width), np.inf, dtype=np.float32)
     limit_px[here] = bone_px[there]
     is_in_front = surroundings.disparity_px > limit_px
-    speaks, is_asked = surroundings.origin == Origin.MATCHED, limit_px < np.inf
+    speaks, is_asked = surroundings.is_matched, limit_px < np.inf
     for _ in range(_N_VOTES):
         before = is_in_front.copy()
         vote_on_guesses(surroundings.picture, speaks, is_asked, is_in_front)
@@ -53,7 +53,7 @@ def find_foreground(
         is_in_front = double(is_in_front.view(np.uint8), box).view(np.bool_)
         limit_px = double(np.float32(2.0) * limit_px, box)
     here, there = box.shared_slices(measured.box)
-    is_matched = measured.origin[there] == Origin.MATCHED
+    is_matched = measured.is_matched[there]
     marks, is_nearer = is_in_front[here], measured.disparity_px[there] > limit_px[here]
     marks ^= (marks ^ is_nearer) & is_matched
     return Foreground(surroundings, measured, is_in_front)

@@ -21,9 +21,17 @@ from navapp.registration.model import RegistrationModel
 from navapp.registration.residual_blocks import ResidualBlock, join
 from navapp.tracking.edge_kernels import measure_edge_offsets
 from navapp.tracking.frame import MODEL_SETTINGS, Fit
-from navapp.tracking.outline_kernels import Eye, Rim, find_rim, is_outline, thin_rim, warp_depth
+from navapp.tracking.outline_kernels import (
+    Eye,
+    Rim,
+    count_near,
+    find_rim,
+    is_outline,
+    thin_rim,
+    warp_depth,
+)
 from navapp.tracking.surface_meter import MODEL_CORRELATION_PX
-from navapp.values import DisparityMap, Origin
+from navapp.values import DisparityMap
 
 # All chosen, but where a source is named. The bone must be measured inside the outline, in this
 # fraction of the pixels at these distances.
@@ -129,7 +137,7 @@ class OutlineMeter:
         """(N,) points with the bone measured inside and nothing nearer outside."""
         pixel = self._geometry.project(rim.point)
         inner = pixel[:, None] - _INSIDE_PX[:, None] * rim.normal[:, None]
-        is_measured = _look_up(measured.origin, inner, box, 0) == Origin.MATCHED
+        is_measured = _look_up(measured.is_matched, inner, box, 0)
         is_free: NDArray[np.bool_] = is_measured.mean(axis=1) >= _LEAST_INSIDE
         if coarse_px is not None:
             beside_px = _look_up(coarse_px, pixel + _BESIDE_PX * rim.normal, box, np.nan)
@@ -146,8 +154,7 @@ class OutlineMeter:
         slope = np.column_stack([rim.normal * per_mm[:, None], by_depth])
         arm = rim.point - pose.apply(self._model.centre_mm)
         surface_px = self._model.sigma_mm[rim.vertex] * per_mm
-        apart = np.linalg.norm(rim.pixel[:, None] - rim.pixel[None], axis=2)
-        n_sharing = (apart <= 0.5 * MODEL_CORRELATION_PX).sum(axis=1).astype(np.float64)
+        n_sharing = count_near(rim.pixel, 0.5 * MODEL_CORRELATION_PX)
         jacobian = np.column_stack([slope, np.cross(arm, slope)])
         return jacobian, _EDGE_SIGMA_PX**2 + surface_px**2, n_sharing, arm
 

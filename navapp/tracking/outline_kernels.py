@@ -218,3 +218,16 @@ def thin_rim(rim: Rim) -> Rim:
             m += 1
     index = kept[:m]
     return Rim(rim.point[index], rim.pixel[index], normal[:m], rim.length[index], rim.vertex[index])
+
+
+@njit(cache=True, nogil=True)
+def count_near(pixel: NDArray[np.float64], reach_px: float) -> NDArray[np.float64]:
+    """(N,) how many of some pixels (N, 2) lie within reach of each, itself included."""
+    n = pixel.shape[0]
+    counts = np.zeros(n)
+    for i in range(n):
+        for j in range(n):
+            dx, dy = pixel[i, 0] - pixel[j, 0], pixel[i, 1] - pixel[j, 1]
+            if dx * dx + dy * dy <= reach_px * reach_px:
+                counts[i] += 1.0
+    return counts

@@ -4,9 +4,9 @@ Four kinds: on the model at a pose, exact and near; on samples of it; freely, wh
 coarsely, to tell what lies where.
 """
 
-import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from functools import cached_property, lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,18 +66,32 @@ WIDE_VIEW = Margins(box_px=120, band_mm=65.0)
 _AROUND = Margins(box_px=24, band_mm=60.0)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Measurement:
     """The surface in the bone's box."""
 
     disparity: DisparityMap  # over the box
-    cloud: SurfaceCloud  # of the measured pixels, thinned
+    make_cloud: Callable[[], SurfaceCloud]  # of the measured pixels, thinned
     matched_fraction: float  # of the pixels that were asked for: the box's, or the model's
     correlation_px: float  # distance in the picture over which its errors go together
     # the model that it was measured on; None of a free measurement.
     rendered: RenderedView | None = None
     pairs_backward: bool = True  # as of `Scene`
-    relief_px: float = 0.0  # as of `Scene.from_stereo`
+    # length over which the bone's relief goes together, mm, times the focal length, px; 0: it is
+    # not counted.
+    relief_mm_px: float = 0.0
+
+    @cached_property
+    def cloud(self) -> SurfaceCloud:
+        """Of the measured pixels, thinned: made by whoever asks first, not by two threads."""
+        return self.make_cloud()
+
+    @property
+    def relief_px(self) -> float:
+        """As of `Scene.from_stereo`."""
+        # What was measured on the model has no outlier that lies far off.
+        z_mm = self.cloud.points_mm[:, 2]
+        return self.relief_mm_px / float(z_mm.mean()) if len(z_mm) > 0 else 0.0
 
     @property
     def scene(self) -> Scene:
@@ -184,19 +198,23 @@ class SurfaceMeter:
             return None
         box, band_px = region
         found = match_surface(replace(pair, box=box), band_px, fills=False).disparity
-        return self._measured_freely(found, self._cloud(found))
+        return self._measured_freely(found, partial(self._cloud, found))
 
     def take_surface(self, found: DisparityMap, n_points: int) -> Measurement:
         """A free measurement from a map that was matched elsewhere: filled pixels count as well.
 
         Its cloud has so many points, spread evenly; all known pixels when they are fewer.
         """
-        n_known = int(np.count_nonzero(found.origin))
-        stride_px = max(1, int((0.9 * n_known / n_points) ** 0.5))
-        cloud = found.reproject(self.geometry, stride_px, tuple(Origin)[1:])
-        if len(cloud) > n_points:
-            cloud = cloud.select(np.linspace(0, len(cloud) - 1, n_points).astype(np.intp))
-        return self._measured_freely(found, cloud)
+
+        def make_cloud() -> SurfaceCloud:
+            n_known = int(np.count_nonzero(found.origin))
+            stride_px = max(1, int((0.9 * n_known / n_points) ** 0.5))
+            cloud = found.reproject(self.geometry, stride_px, tuple(Origin)[1:])
+            if len(cloud) <= n_points:
+                return cloud
+            return cloud.select(np.linspace(0, len(cloud) - 1, n_points).astype(np.intp))
+
+        return self._measured_freely(found, make_cloud)
 
     def measure_coarsely(
         self, pair: RectifiedPair, pose: RigidTransform, box: Box | None = None
@@ -240,11 +258,11 @@ class SurfaceMeter:
         Its errors go together over `correlation_px`.
         """
         is_expected = np.isfinite(expected.support_px)
-        cloud = self._cloud(remove_gap_rims(found, is_expected))
         n_expected = max(int(np.count_nonzero(is_expected)), 1)
         return self._measured_on_model(
-            found, cloud, found.n_matched / n_expected, expected, correlation_px
-        )
+            found, lambda: self._cloud(remove_gap_rims(found, is_expected)),
+            found.n_matched / n_expected, expected, correlation_px,
+        )  # fmt: skip
 
     def measure_on_samples(self, expected: Expected) -> Measurement:
         """As `measure_on_model` at every sixth pixel each way, in more steps: it sees further.
@@ -257,28 +275,29 @@ class SurfaceMeter:
         n_asked = max(int(np.count_nonzero(np.isfinite(asked))), 1)
         matched_fraction = int(np.count_nonzero(thin.origin)) / n_asked
         found = _spread(thin, _SAMPLES_PX, support_px.shape)
-        cloud = found.reproject(self.geometry, _SAMPLES_PX)
-        return self._measured_on_model(found, cloud, matched_fraction, expected)
+        make_cloud = partial(found.reproject, self.geometry, _SAMPLES_PX)
+        return self._measured_on_model(found, make_cloud, matched_fraction, expected)
 
-    def _measured_freely(self, found: DisparityMap, cloud: SurfaceCloud) -> Measurement:
+    def _measured_freely(
+        self, found: DisparityMap, make_cloud: Callable[[], SurfaceCloud]
+    ) -> Measurement:
         return Measurement(
-            found, cloud, found.matched_fraction, FREE_CORRELATION_PX,
+            found, make_cloud, found.matched_fraction, FREE_CORRELATION_PX,
             pairs_backward=self.pairs_backward,
         )  # fmt: skip
 
     def _measured_on_model(
         self,
         found: DisparityMap,
-        cloud: SurfaceCloud,
+        make_cloud: Callable[[], SurfaceCloud],
         matched_fraction: float,
         expected: Expected,
         correlation_px: float = MODEL_CORRELATION_PX,
     ) -> Measurement:
-        depth_mm = float(np.median(cloud.points_mm[:, 2])) if len(cloud) > 0 else math.inf
-        relief_px = RELIEF_LENGTH_MM * self.geometry.focal_px / depth_mm
+        relief_mm_px = RELIEF_LENGTH_MM * self.geometry.focal_px
         return Measurement(
-            found, cloud, matched_fraction, correlation_px, expected.view, self.pairs_backward,
-            relief_px,
+            found, make_cloud, matched_fraction, correlation_px, expected.view,
+            self.pairs_backward, relief_mm_px,
         )  # fmt: skip
 
     def _cloud(self, found: DisparityMap) -> SurfaceCloud:
@@ -291,7 +310,7 @@ def remove_gap_rims(found: DisparityMap, is_expected: NDArray[np.bool_]) -> Disp
     """Without the rims of large gaps in what is expected (h, w), unless that leaves too little."""
     import cv2
 
-    is_matched = found.origin > 0
+    is_matched = found.is_matched
     gaps = large_regions(is_expected & ~is_matched, _LARGEST_HIGHLIGHT_PX2, connectivity=4)
     size = 2 * _MIXED_PX + 1
     around = cv2.dilate(gaps.astype(np.uint8), np.ones((size, size), np.uint8)) > 0

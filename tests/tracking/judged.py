@@ -78,7 +78,7 @@ def judged(
     meter = SimpleNamespace(model=model, geometry=GEOMETRY)
     judge = PoseJudge(meter, quality, SurfaceAlone())
     cloud = measured.reproject(GEOMETRY, 3)
-    fit = Fit(estimate, Measurement(measured, cloud, 1.0, FREE_CORRELATION_PX))
+    fit = Fit(estimate, Measurement(measured, lambda: cloud, 1.0, FREE_CORRELATION_PX))
     frame = Frame(None, estimate.camera_from_bone, Stopwatch())
     checks = Told(PairCheck(health, None, None, np.zeros(measured.origin.shape, dtype=np.bool_)))
     return judge.judge(frame, fit, goal or Goal(NO_TARGETS, 3.0), predicted, checks=checks)

@@ -119,7 +119,7 @@ class FakeMeter:
         return self.true.apply(np.column_stack([x, y, height_mm(x, y)])) + noise_mm
 
     def _measurement(self, points_mm: np.ndarray, share: float) -> Measurement:
-        self.answers.append(Measurement(NO_MAP, as_cloud(points_mm, 0.1), share, 11.0))
+        self.answers.append(Measurement(NO_MAP, lambda: as_cloud(points_mm, 0.1), share, 11.0))
         return self.answers[-1]
 
 

@@ -29,7 +29,7 @@ NOTHING_NEARER = NearerSearch(0.0, {})
 def measurement(*, is_on_model: bool = False) -> Measurement:
     model = femur_for_registration()
     view = render_rectified(model.rendered_mesh, TRUE, GEOMETRY, MAP.box) if is_on_model else None
-    return Measurement(MAP, NO_CLOUD, 0.0, 11.0, view)
+    return Measurement(MAP, lambda: NO_CLOUD, 0.0, 11.0, view)
 
 
 class CoarseMeter:
@@ -146,7 +146,7 @@ def test_unknown_maps_are_checked_too() -> None:
         MAP.x, MAP.y,
     )  # fmt: skip
     with checks_with(CoarseMeter()) as checks:
-        found = checks.check(Measurement(nothing, NO_CLOUD, 0.0, 11.0), TRUE).result()
+        found = checks.check(Measurement(nothing, lambda: NO_CLOUD, 0.0, 11.0), TRUE).result()
     assert np.isnan(found.health.row_offset_px)
 
 

@@ -65,7 +65,7 @@ def test_a_mirrored_camera_sees_the_mirrored_bone() -> None:
 def test_what_the_mirrored_camera_measures_is_the_mirror_image() -> None:
     turned = TRUE.move((15.0, 5.0, 0.0, 0.0, 0.0, 0.0), np.zeros(3))
     found = measured_map(femur(), turned)
-    measured = Measurement(found, found.reproject(GEOMETRY), 0.5, 11.0)
+    measured = Measurement(found, lambda: found.reproject(GEOMETRY), 0.5, 11.0)
     mirrored = mirror_measurement(measured, GEOMETRY)
     assert mirrored.disparity.disparity_px.shape == found.disparity_px.shape
     given, expected = (

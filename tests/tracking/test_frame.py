@@ -24,7 +24,7 @@ def fit_of(ratio: float) -> Fit:
     rms_mm = float(np.sqrt((kernel * noise**2).sum() / kernel.sum()))
     pose = RigidTransform.identity("left_rect", "femur")
     estimate = PoseEstimate(pose, np.eye(6), 2000, 0.9, rms_mm, CLAIMED_MM, 9, True)
-    return Fit(estimate, Measurement(NO_MAP, NO_CLOUD, 1.0, 11.0))
+    return Fit(estimate, Measurement(NO_MAP, lambda: NO_CLOUD, 1.0, 11.0))
 
 
 @pytest.mark.parametrize("ratio", [0.3, 0.55, 0.8, 1.0])

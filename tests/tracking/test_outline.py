@@ -63,7 +63,7 @@ def fit_at(pose: RigidTransform, is_measured: bool = True) -> Fit:
     origin = np.where(view.mask & is_measured, Origin.MATCHED, Origin.UNKNOWN).astype(np.uint8)
     disparity = GEOMETRY.disparity_map_px(view.depth_mm)
     found = DisparityMap(disparity, np.full_like(disparity, 0.1), origin, box.x, box.y)
-    measurement = Measurement(found, NO_CLOUD, 1.0, 11.0, view)
+    measurement = Measurement(found, lambda: NO_CLOUD, 1.0, 11.0, view)
     estimate = PoseEstimate(pose, np.diag(SIGMAS**2), 2000, 1.0, 0.1, 0.1, 5, True)
     return Fit(estimate, measurement)
 
@@ -113,7 +113,7 @@ def test_a_direction_that_the_surface_leaves_free_and_the_outline_fixes_is_not_f
     # Along the bone the surface says a fiftieth of what it says across.
     sigmas = SIGMAS * [1.0, 50.0, 1.0, 1.0, 1.0, 1.0]
     estimate = replace(fit.estimate, covariance=np.diag(sigmas**2)).with_reason(Reason.DEGENERATE)
-    free = Fit(estimate, replace(fit.measured, cloud=seen))
+    free = Fit(estimate, replace(fit.measured, make_cloud=lambda: seen))
     assert meter().join(pair(), free, None).estimate.reasons == ()
     dark = replace(pair(), left=0 * pair().left, right=0 * pair().right)
     assert meter().join(dark, free, None).estimate.reasons == (Reason.DEGENERATE,)

@@ -10,6 +10,7 @@ from navapp.geometry.zbuffer import render_rectified
 from navapp.tracking.outline_kernels import (
     Eye,
     Rim,
+    count_near,
     find_rim,
     is_outline,
     thin_rim,
@@ -136,3 +137,10 @@ def test_thinned_points_are_outermost_with_the_normals_of_the_reference() -> Non
 def test_an_empty_rim_stays_empty() -> None:
     none = Rim(*(part[:0] for part in rim_of(LEFT)))
     assert len(thin_rim(none).pixel) == 0
+
+
+@pytest.mark.kernel
+def test_pixels_within_reach_are_counted_with_the_one_itself() -> None:
+    pixel = np.random.default_rng(3).uniform(0.0, 40.0, (50, 2))
+    apart = np.linalg.norm(pixel[:, None] - pixel[None], axis=2)
+    np.testing.assert_array_equal(count_near(pixel, 5.5), (apart <= 5.5).sum(axis=1))

@@ -26,7 +26,7 @@ from navapp.geometry.rectification import RectifiedPair, Rectifier
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer import RenderedView, bounds_of, render_rectified
 from navapp.stereo import refine_on_model
-from navapp.values import DisparityMap, Origin
+from navapp.values import DisparityMap
 from sim_devices.sensor import SensorModel
 
 # A pixel that differs from its partner by more than noise does (standard deviations) shows a
@@ -76,7 +76,7 @@ def measure_budget(
     found = refine_on_model(seen.pair, seen.support_px)
     offset_px = found.disparity_px - seen.support_px
     with np.errstate(invalid="ignore"):
-        is_on = (found.origin == Origin.MATCHED) & (np.abs(offset_px) < _LARGEST_OFFSET_PX)
+        is_on = found.is_matched & (np.abs(offset_px) < _LARGEST_OFFSET_PX)
     pixels = seen.pixels.select(is_on[seen.pixels.rows, seen.pixels.columns])
     if len(pixels.rows) < _FEWEST_PIXELS:
         return None
