@@ -166,13 +166,8 @@ class _Fit:
         return coarse.iterations + fine.iterations, fine.has_finished
 
     def run_coarse(self) -> LoopState:
-        """The coarse loop, on thinned points; forward pairs only when the start is near.
-
-        With one width of the kernel alone there is nothing to narrow.
-        """
+        """The coarse loop, on thinned points; forward pairs only when the start is near."""
         arrays, model, settings = self._scene.arrays, self._model.arrays, self._settings
-        if settings.widest_mm <= settings.narrowest_mm:
-            return LoopState(0, True, settings.narrowest_mm, 0)
         sigma_mm = choose_first_sigma_mm(arrays, model, self._pose, self._pairs, settings)
         if sigma_mm <= settings.narrowest_mm:
             return LoopState(0, sigma_mm > 0.0, sigma_mm, 0)

@@ -26,7 +26,7 @@ class SurfaceBlock(NamedTuple):
 
 
 class FurtherBlock(NamedTuple):
-    """Residuals that the k unknowns bring down, those that take part."""
+    """Residuals that the k unknowns bring down, those that take part: finite, variances above 0."""
 
     rows: FloatArray  # (N, k) how the predictions grow with the unknowns
     residual: FloatArray  # (N,) observed - predicted

@@ -60,9 +60,9 @@ class ResidualBlock:
         count = 1.0 / self.n_sharing
         return NearResiduals(is_near, float(count.sum()), float(count[is_near].sum()))
 
-    def only(self, near: "NearResiduals", rows: FloatArray) -> FurtherBlock:
-        """Those residuals that a pose allows, with the rows (N, k) of all."""
-        kept = np.flatnonzero(near.is_near)
+    def select(self, near: "NearResiduals", rows: FloatArray) -> FurtherBlock:
+        """Those residuals that a pose allows, to be joined; the rows (N, k) are of all."""
+        kept = near.is_near
         return FurtherBlock(
             rows[kept], self.residual[kept], self.variance[kept], self.n_sharing[kept],
             self.common_sd,
@@ -125,11 +125,13 @@ def join(
     # What the surface's residuals show of the variance that they claim, at most all of it.
     ratio2 = max((estimate.rms_mm / estimate.expected_rms_mm) ** 2, _LEAST_SQUARED_RATIO)
     scale = min(float(noise_under_kernel_mm2(ratio2, 1.0, kernel_sigmas)), 1.0)
-    surface = SurfaceBlock(np.zeros(6), np.array(estimate.covariance), scale, noise_variance_ratio)
+    # Of one memory layout: for each there would be a compiled version.
+    covariance = np.ascontiguousarray(estimate.covariance)
+    surface = SurfaceBlock(np.zeros(6), covariance, scale, noise_variance_ratio)
     near = block.find_near(block.jacobian, surface.step, surface.covariance)
     joined = None
     if not (near.is_other or near.is_few):
-        joined = solve_joined(surface, block.only(near, block.jacobian), surface.step)
+        joined = solve_joined(surface, block.select(near, block.jacobian), surface.step)
         if joined.step @ np.linalg.solve(estimate.covariance, joined.step) > _APART:
             joined = None
     step = surface.step if joined is None else joined.step
@@ -156,14 +158,14 @@ def _join_size(
     for from the size that the surface tells, and from the model's own at the pose (6,) that both
     gave it: the better of the two minima counts.
     """
-    step, covariance = np.array(sized.step), np.array(sized.covariance)
-    surface = of_pose._replace(step=step, covariance=covariance)
+    covariance = np.ascontiguousarray(sized.covariance)
+    surface = of_pose._replace(step=sized.step, covariance=covariance)
     rows = block.sized_jacobian(sized)
     near = block.find_near(rows, surface.step, surface.covariance)
     if near.is_few or near.is_other:
         return sized.scale_noise(surface.noise_variance_ratio)
     starts = surface.step, np.append(pose_step, 0.0)
-    allowed = block.only(near, rows)
+    allowed = block.select(near, rows)
     found = (solve_joined(surface, allowed, start) for start in starts)
     best = min(found, key=lambda one: one.cost)
     return replace(sized, step=best.step, covariance=best.covariance)

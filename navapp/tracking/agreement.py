@@ -75,7 +75,9 @@ def compare(
         n_behind -= min(n_reflected, int(_MOST_REFLECTED * n_visible))
     is_open = is_matched & mask & ~is_hidden
     n_open = int(np.count_nonzero(is_open))
-    sparse = np.s_[::_SPREAD_STRIDE_PX, ::_SPREAD_STRIDE_PX]
+    stride = _SPREAD_STRIDE_PX
+    stride = stride if is_open[::stride, ::stride].any() else 1
+    sparse = np.s_[::stride, ::stride]
     is_asked = is_open[sparse]
     return Agreement(
         n_visible,

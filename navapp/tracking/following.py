@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from navapp.geometry.transform import RigidTransform
 from navapp.registration import fit_bimcc, fit_pose
-from navapp.tracking.frame import MODEL_SETTINGS, REST_SETTINGS, Fit, Frame, OnMeasured, ignore
+from navapp.tracking.frame import MODEL_SETTINGS, Fit, Frame, OnMeasured, ignore
 from navapp.tracking.surface_meter import NEAR_BOX, Expected, Measurement, SurfaceMeter
 from navapp.values import Reason
 
@@ -71,17 +71,17 @@ class Follower:
                 break
             measure = self._measure_on_model if is_near else self._meter.measure_on_samples
             measured = measure(expected)
-            watch.lap("stereo")
-            rested = None
             if is_near:
+                # What is told needs no cloud: it is checked while the cloud is made.
                 on_measured(measured, pose)
-                rests = n_rounds > 1 and moved_mm < settings.near_mm
-                kernel = REST_SETTINGS if rests else MODEL_SETTINGS
-                estimate = fit_bimcc(measured.scene, model, pose, kernel)
+            scene, rested = measured.scene, None
+            watch.lap("stereo")
+            if is_near:
+                estimate = fit_bimcc(scene, model, pose, MODEL_SETTINGS)
                 if Reason.TOO_FEW_POINTS not in estimate.reasons:
                     fit, rested = Fit(estimate, measured), estimate.camera_from_bone
             elif measured.matched_fraction >= least_fraction:
-                rested = fit_pose(measured.scene, model, pose, MODEL_SETTINGS)
+                rested = fit_pose(scene, model, pose, MODEL_SETTINGS)
             watch.lap("estimate")
             if rested is None:
                 break

@@ -18,8 +18,6 @@ from navapp.values import PoseEstimate, Reason, Stopwatch
 # flush with the bone. All chosen.
 FREE_SETTINGS = BimccSettings(narrowest_mm=0.5, n_sigmas=1.6)
 MODEL_SETTINGS = BimccSettings(narrowest_mm=0.2, n_sigmas=1.2)
-# At a pose that hardly moves any more the kernel is as narrow as it becomes.
-REST_SETTINGS = MODEL_SETTINGS._replace(widest_mm=MODEL_SETTINGS.narrowest_mm)
 
 # Variance of residuals over the one that the matcher claims: correct poses of simulated femurs,
 # which lie in the open, show at most so much (tests.bench.correlated_residuals).

@@ -31,7 +31,7 @@ from navapp.tracking.outline_kernels import (
     warp_depth,
 )
 from navapp.tracking.surface_meter import MODEL_CORRELATION_PX
-from navapp.values import DisparityMap
+from navapp.values import DisparityMap, Origin
 
 # All chosen, but where a source is named. The bone must be measured inside the outline, in this
 # fraction of the pixels at these distances.
@@ -137,7 +137,7 @@ class OutlineMeter:
         """(N,) points with the bone measured inside and nothing nearer outside."""
         pixel = self._geometry.project(rim.point)
         inner = pixel[:, None] - _INSIDE_PX[:, None] * rim.normal[:, None]
-        is_measured = _look_up(measured.is_matched, inner, box, 0)
+        is_measured = _look_up(measured.origin, inner, box, 0) == Origin.MATCHED
         is_free: NDArray[np.bool_] = is_measured.mean(axis=1) >= _LEAST_INSIDE
         if coarse_px is not None:
             beside_px = _look_up(coarse_px, pixel + _BESIDE_PX * rim.normal, box, np.nan)

@@ -71,25 +71,26 @@ class Measurement:
     """The surface in the bone's box."""
 
     disparity: DisparityMap  # over the box
-    make_cloud: Callable[[], SurfaceCloud]  # of the measured pixels, thinned
+    # of the measured pixels, thinned: belongs to `disparity`, whoever replaces one replaces both.
+    make_cloud: Callable[[], SurfaceCloud]
     matched_fraction: float  # of the pixels that were asked for: the box's, or the model's
     correlation_px: float  # distance in the picture over which its errors go together
     # the model that it was measured on; None of a free measurement.
     rendered: RenderedView | None = None
     pairs_backward: bool = True  # as of `Scene`
-    # length over which the bone's relief goes together, mm, times the focal length, px; 0: it is
-    # not counted.
+    # length over which the bone's relief goes together, mm, times the focal length, px: over the
+    # depth in mm it is `relief_px`; 0: relief is not counted.
     relief_mm_px: float = 0.0
 
     @cached_property
     def cloud(self) -> SurfaceCloud:
-        """Of the measured pixels, thinned: made by whoever asks first, not by two threads."""
+        """Made when first asked for, so that a check can begin before; ask from one thread."""
         return self.make_cloud()
 
     @property
     def relief_px(self) -> float:
         """As of `Scene.from_stereo`."""
-        # What was measured on the model has no outlier that lies far off.
+        # What was measured on the model has no outlier that lies far off: the mean will do.
         z_mm = self.cloud.points_mm[:, 2]
         return self.relief_mm_px / float(z_mm.mean()) if len(z_mm) > 0 else 0.0
 

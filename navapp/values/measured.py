@@ -23,7 +23,7 @@ class Origin(IntEnum):
 
 
 def _find_matched(origin: NDArray[np.uint8]) -> NDArray[np.bool_]:
-    # With a member itself numpy compares whole integers, which takes six times as long.
+    # With a member itself numpy compares whole integers, which takes many times as long.
     return np.asarray(origin == int(Origin.MATCHED))
 
 

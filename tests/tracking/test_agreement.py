@@ -164,6 +164,15 @@ def test_wider_differences_than_claimed_show_in_the_spread() -> None:
     assert agreement(replace(MAP, disparity_px=noisy)).spread_ratio > 1.5
 
 
+def test_a_few_open_pixels_tell_their_spread_wherever_they_lie() -> None:
+    rng = np.random.default_rng(7)
+    noisy = MAP.disparity_px + 6.0 * MAP.sigma_px * rng.standard_normal(MAP.sigma_px.shape)
+    rows, columns = np.indices(MAP.origin.shape)
+    between = (rows % 4 == 1) & (columns % 4 == 1)
+    found = replace(MAP, disparity_px=noisy.astype(np.float32)).only(between)
+    assert agreement(found).spread_ratio > 1.5
+
+
 def test_a_view_without_the_model_agrees_with_nothing() -> None:
     empty = RenderedView(
         np.full((HEIGHT, WIDTH), np.nan, np.float32),

@@ -125,9 +125,12 @@ def test_a_bone_that_never_rests_has_not_settled() -> None:
 
 def test_what_is_measured_on_the_model_is_told_before_it_is_fitted() -> None:
     meter, told = FakeMeter(), []
-    fit = follower(meter, RESTLESS).follow(
-        frame_at(NEAR), NEAR, on_measured=lambda measured, pose: told.append((measured, pose))
-    )
+
+    def tell(measured: Measurement, pose: RigidTransform) -> None:
+        assert "cloud" not in vars(measured)  # it is made while what is told is checked
+        told.append((measured, pose))
+
+    fit = follower(meter, RESTLESS).follow(frame_at(NEAR), NEAR, on_measured=tell)
     assert len(told) == meter.asked.count("on_model") > 1
     assert told[-1][0] is fit.measured
     assert told[-1][1] is not fit.pose

@@ -245,7 +245,8 @@ def _choose(
     if not found:
         raise _undetermined("no time offset lets half of the recording lie in the tracker's time")
     least_mm = min(fit_mm for _, _, fit_mm in found)
-    # Of those that end alike the likeliest offset: others came through seconds that are scored.
+    # Of those that end alike the first, which is the likeliest: last bits must not choose, since
+    # the others were solved through the seconds that are scored.
     best = next(one for one in found if one[2] <= _ALIKE * least_mm)
     if best[2] > _MOST_FIT_MM:
         raise _undetermined(

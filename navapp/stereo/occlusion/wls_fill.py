@@ -143,7 +143,7 @@ def _rules(scene: Scene, settings: FillSettings) -> Rules:
     if radius is None:
         # A part of the pixels tells the spread as well as all.
         part = np.s_[::_SPREAD_STEP, ::_SPREAD_STEP]
-        is_support = (scene.origin[part] == Origin.MATCHED) & (scene.classes[part] == 0)
+        is_support = (scene.origin[part] == int(Origin.MATCHED)) & (scene.classes[part] == 0)
         radius = support_radius_px(scene.disparity[part][is_support])
     return Rules(
         radius=radius,
