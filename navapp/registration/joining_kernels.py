@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 
 from navapp.geometry.transform import FloatArray
-from navapp.registration.step_kernels import noise_under_kernel_mm2
+from navapp.registration.step_kernels import mirror, noise_under_kernel_mm2
 
 # All chosen. Width of the kernel in sigma: 97 % of the efficiency of least squares (as
 # `BimccSettings`); steps of the search.
@@ -101,9 +101,7 @@ def sum_block(
             pull[a] += weighted * block.residual[i]
             for b in range(a, size):
                 information[a, b] += weighted * row[b]
-    for a in range(size):
-        for b in range(a):
-            information[a, b] = information[b, a]
+    mirror(information)
     shown = noise_under_kernel_mm2(squares, n, _KERNEL_SIGMAS)
     return float((_CLAIM_COUNT + n * shown) / (_CLAIM_COUNT + n))
 

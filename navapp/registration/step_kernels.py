@@ -103,7 +103,7 @@ def set_motion_row(
 @njit(cache=True, nogil=True)
 def mirror(H: FloatArray) -> None:
     """Copy the upper triangle into the lower one, in place."""
-    for a in range(6):
+    for a in range(len(H)):
         for b in range(a):
             H[a, b] = H[b, a]
 

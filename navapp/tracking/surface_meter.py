@@ -206,16 +206,12 @@ class SurfaceMeter:
 
         Its cloud has so many points, spread evenly; all known pixels when they are fewer.
         """
-
-        def make_cloud() -> SurfaceCloud:
-            n_known = int(np.count_nonzero(found.origin))
-            stride_px = max(1, int((0.9 * n_known / n_points) ** 0.5))
-            cloud = found.reproject(self.geometry, stride_px, tuple(Origin)[1:])
-            if len(cloud) <= n_points:
-                return cloud
-            return cloud.select(np.linspace(0, len(cloud) - 1, n_points).astype(np.intp))
-
-        return self._measured_freely(found, make_cloud)
+        n_known = int(np.count_nonzero(found.origin))
+        stride_px = max(1, int((0.9 * n_known / n_points) ** 0.5))
+        cloud = found.reproject(self.geometry, stride_px, tuple(Origin)[1:])
+        if len(cloud) > n_points:
+            cloud = cloud.select(np.linspace(0, len(cloud) - 1, n_points).astype(np.intp))
+        return self._measured_freely(found, lambda: cloud)
 
     def measure_coarsely(
         self, pair: RectifiedPair, pose: RigidTransform, box: Box | None = None
