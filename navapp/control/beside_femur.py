@@ -114,7 +114,7 @@ class BesideFemur:
 
         def look(on_progress: Callable[[float], None]) -> FoundBone:
             hidden = OccludedTracker(tracker, femur, left_from_femur)
-            found = search.find(hidden, frame.left, frame.right, left_from_femur, goal, on_progress)
+            found = search.find(hidden, frame, left_from_femur, goal, on_progress)
             return FoundBone(
                 found.tracked, frame.captured_ns, left_from_femur, track_number, found.spread
             )

@@ -171,13 +171,11 @@ class BoneTracks:
         """Follow the candidate into a frame, or judge a proposed pose where it stands."""
         candidate = self._candidates[0]
         tracker, goal = self._trackers.tracker(stage.bone), self._trackers.goal(stage)
-        left, right, track = frame.left, frame.right, candidate.track
+        track = candidate.track
         if candidate.is_held:
-            tracked = tracker.assess(left, right, track.left_from_bone, goal)
+            tracked = tracker.assess(frame, track.left_from_bone, goal)
         else:
-            tracked, track = tracker.track(
-                left, right, frame.captured_ns, track, goal, frame.skew_ns
-            )
+            tracked, track = tracker.track(frame, track, goal)
         self._candidates[0] = replace(candidate, tracked=tracked, track=track)
         return tracked
 
@@ -185,10 +183,7 @@ class BoneTracks:
         """Follow the accepted bone into a frame."""
         tracker, goal = self._trackers.tracker(stage.bone), self._trackers.goal(stage)
         track = self._tracks[stage.bone]
-        tracked, track = tracker.track(
-            frame.left, frame.right, frame.captured_ns, track, goal, frame.skew_ns
-        )
-        self._tracks[stage.bone] = track
+        tracked, self._tracks[stage.bone] = tracker.track(frame, track, goal)
         return tracked
 
     def predict(self, stage: StageSpec, time_ns: int) -> RigidTransform | None:
@@ -223,10 +218,7 @@ class BoneTracks:
         track = tracks[stage.bone]
         if moved is not None:
             track = track.carry(moved)
-        tracked, track = tracker.glance(
-            frame.left, frame.right, frame.captured_ns, track, goal, frame.skew_ns
-        )
-        tracks[stage.bone] = track
+        tracked, tracks[stage.bone] = tracker.glance(frame, track, goal)
         return tracked
 
     def register_now(self, stage: StageSpec, frame: StereoFrame) -> TrackedFrame:

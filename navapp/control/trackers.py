@@ -171,7 +171,7 @@ class Trackers:
         """Search for a stage's bone in a frame; best answer first, empty without any start."""
         start, goal = self.start(stage.bone), self.goal(stage)
         tracker, bone = self._searching_tracker(stage.bone, start), self.bone(stage.bone)
-        answers = tracker.register(frame.left, frame.right, start, goal, on_progress)
+        answers = tracker.register(frame, start, goal, on_progress)
         return self._look_closer(stage, bone, frame, answers)
 
     def _look_closer(
@@ -199,7 +199,7 @@ class Trackers:
             return answers
         tracker = self._make(bone.with_faces(faces).model, None)
         prior = Prior({stage.bone: estimate.camera_from_bone})
-        closer = tracker.register(frame.left, frame.right, prior, self.goal(stage))
+        closer = tracker.register(frame, prior, self.goal(stage))
         is_better = bool(closer) and closer[0].verdict.rank < best.verdict.rank
         return [closer[0], *answers[1:]] if is_better else answers
 

@@ -4,12 +4,10 @@ Where the knee may bend to says where to look. What is found is fitted to the pi
 judged like any other pose.
 """
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 
-from navapp.geometry.rectification import Image
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.joint.occluded_tracker import OccludedTracker
 from navapp.joint.swept_sampler import SweptSampler
@@ -18,7 +16,8 @@ from navapp.registration import DepthMap, is_same_pose
 from navapp.registration.verdict import Goal
 from navapp.stereo import match_surface
 from navapp.tracking.frame import Fit, Frame, ignore
-from navapp.values import Reason, Stopwatch, TrackedFrame
+from navapp.values import Reason, StereoPictures, Stopwatch, TrackedFrame
+from navapp.values.progress import Progress
 
 # Chosen: so many places are stepped from.
 _N_PLACES = 10
@@ -42,26 +41,24 @@ class KneeSearch:
     def find(
         self,
         tracker: OccludedTracker,
-        left: Image,
-        right: Image,
+        pictures: StereoPictures,
         left_from_femur: RigidTransform,
         goal: Goal,
-        on_progress: Callable[[float], None] = ignore,
+        on_progress: Progress = ignore,
     ) -> FoundTibia:
         """The judged pose of the tibia, and how far places of rest beside it spread.
 
         Args:
             tracker: of the tibia, behind the femur.
-            left: the left picture.
-            right: of the same instant.
-            left_from_femur: the femur's pose in it.
+            pictures: of both bones.
+            left_from_femur: the femur's pose in them.
             goal: of the tibia's stage.
             on_progress: told the fraction done; what it raises stops the search.
         """
         watch, meter = Stopwatch(), tracker.meter
         camera_from_femur = tracker.rectify_pose(left_from_femur)
-        pair, band_px = meter.rectify_surroundings(left, right, None)
-        frame = Frame(pair, camera_from_femur, watch, on_progress=on_progress)
+        pair, band_px = meter.rectify_surroundings(pictures.left, pictures.right, None)
+        frame = Frame(pictures, pair, camera_from_femur, watch, on_progress=on_progress)
         watch.lap("rectify")
         found = tracker.occluder.remove(match_surface(pair, band_px, fills=False).disparity)
         watch.lap("stereo")
@@ -75,7 +72,7 @@ class KneeSearch:
         best = tracker.buried.select(fits)
         if best is None:
             return FoundTibia(tracker.judge.lost(Reason.BONE_LOST, watch), np.zeros((6, 6)))
-        spread = _measure_spread(fits, best, tracker.centre_mm)
+        spread = _measure_spread(fits, best, tracker.model.centre_mm)
         return FoundTibia(tracker.judge_with(spread).judge(frame, best, goal), spread)
 
 

@@ -4,10 +4,9 @@ Source: the paper's proposed system, section 3.2 and figure 2: the steps of `Bim
 its intra-operative stage. How they differ from it, and why, is told in docs/how/registration.md.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import replace
 
-from navapp.geometry.rectification import Image
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
 from navapp.registration.verdict import (
@@ -17,13 +16,9 @@ from navapp.registration.verdict import (
     is_place_doubted,
     is_worth_a_second_look,
 )
-from navapp.tracking.checks import PairChecks
-from navapp.tracking.diagnosis import Diagnosis
 from navapp.tracking.first_registration import FirstRegistration
 from navapp.tracking.frame import Fit, Frame, ignore
-from navapp.tracking.judging import PoseJudge
 from navapp.tracking.motion import TrackState, is_worth_a_search
-from navapp.tracking.row_times import RowTimes
 from navapp.tracking.search.after_loss import SearchAfterLoss
 from navapp.tracking.search.buried import BuriedSearch
 from navapp.tracking.search.highlights import HighlightSearch
@@ -37,10 +32,11 @@ from navapp.values import (
     Prior,
     Reason,
     Status,
-    Stopwatch,
+    StereoPictures,
     TrackedFrame,
     Verdict,
 )
+from navapp.values.progress import Progress
 
 
 class BimccTracker(Tracker):
@@ -48,7 +44,7 @@ class BimccTracker(Tracker):
 
     `aspects`, edges of the bone, are for a first registration without a pose: without them it goes
     by the measured surface alone, which finds the bone in a box, but less often in the whole view
-    (docs/how/registration.md). The other parts have defaults; a test replaces them.
+    (docs/how/registration.md).
     """
 
     def __init__(
@@ -57,68 +53,43 @@ class BimccTracker(Tracker):
         bone: BoneModel,
         settings: TrackerSettings | None = None,
         aspects: AspectGraph | None = None,
-        *,
         meter: SurfaceMeter | None = None,
-        judge: PoseJudge | None = None,
-        near: NearSearch | None = None,
-        highlights: HighlightSearch | None = None,
-        buried: BuriedSearch | None = None,
-        after_loss: SearchAfterLoss | None = None,
-        diagnosis: Diagnosis | None = None,
     ) -> None:
-        super().__init__(rig, bone, settings, judge, diagnosis, meter)
+        super().__init__(rig, bone, settings, meter)
         meter, scorer = self.meter, self.scorer
         left_out = self.settings.leaves_out
         self.tells_foreground = "fill" not in left_out
-        self.near = near or NearSearch(meter, scorer.score)
-        self.highlights = highlights or HighlightSearch(meter)
+        self.near = NearSearch(meter, scorer.score)
+        self.highlights = HighlightSearch(meter)
         self._looks_again = "second look" not in left_out
-        self.buried = buried or BuriedSearch(meter)
-        self.after_loss = after_loss or SearchAfterLoss(meter, self.near, scorer)
+        self.buried = BuriedSearch(meter)
+        self.after_loss = SearchAfterLoss(meter, self.near, scorer)
         self.whole_view = WholeViewSearch(meter, aspects)
 
     def track(
-        self,
-        left: Image,
-        right: Image,
-        captured_ns: int,
-        state: TrackState,
-        goal: Goal,
-        skew_ns: int = 0,
+        self, pictures: StereoPictures, state: TrackState, goal: Goal
     ) -> tuple[TrackedFrame, TrackState]:
         """Follow the bone into the next frame (the paper's section 3.2, intra-operative)."""
-        watch = Stopwatch()
-        # Predict where the bone will be.
-        left_from_bone = state.predict(captured_ns, self.centre_mm)
-        times = RowTimes.of_pair(self.meter, state, captured_ns, skew_ns)
-        # Rectify its box and depth band; the model's projection is the box of section 3.2.1.
-        frame = self.begin(left, right, left_from_bone, watch, NEAR_VIEW, times)
+        # Predict where the bone will be; rectify its box and depth band: the model's projection is
+        # the box of section 3.2.1.
+        frame = self.begin_predicted(pictures, state)
         if state.n_lost == 0:
-            best = self._follow(frame, state, goal, frame.start)
-            best = self._follow_closer(left, right, frame, best, state, goal)
+            best = self._follow_closer(frame, self._follow(frame, state, goal), state, goal)
         else:
             best = self.look_near(frame, goal)
         if _is_searched_after_loss(best.verdict, state):
-            n_searches, box = state.n_searches, self.boxes.follow(state.box, left)
-            state = replace(state, box=box, n_searches=n_searches + 1)
             # Search where the box lies, and where the bone was expected.
-            best = self.search_places(
-                left, right, self.boxes.starts(left_from_bone, state.box), self.after_loss.find,
-                goal, frame.start, best, watch, n_searches, times,
-            )  # fmt: skip
-        if best.verdict.status is not Status.OK:
-            best = best.with_cause(self.find_cause(left, right, left_from_bone, state, best))
+            box = self.boxes.follow(state.box, pictures.left)
+            expected = state.predict(pictures.captured_ns, self.model.centre_mm)
+            places = self.boxes.starts(expected, box)
+            best = self._search_places(frame, places, state.n_searches, goal, best)
+            state = replace(state, box=box, n_searches=state.n_searches + 1)
+        best = best.with_cause(self.find_cause(frame, state, best))
         # Update the motion, and the box.
-        return self.update(best, state, left, captured_ns, watch)
+        return self.update(best, state, frame)
 
     def _follow_closer(
-        self,
-        left: Image,
-        right: Image,
-        frame: Frame,
-        answer: TrackedFrame,
-        state: TrackState,
-        goal: Goal,
+        self, frame: Frame, answer: TrackedFrame, state: TrackState, goal: Goal
     ) -> TrackedFrame:
         """Once more where the rows were exposed during another motion than was expected."""
         pose, verdict = answer.left_from_bone, answer.verdict
@@ -128,42 +99,53 @@ class BimccTracker(Tracker):
         times = frame.times.with_motion_to(self.rectify_pose(pose))
         if times is None:
             return answer
-        again = self.begin(left, right, pose, frame.watch, NEAR_VIEW, times)
-        closer = self._follow(again, state, goal, frame.start)
+        again = self.begin(frame.pictures, pose, NEAR_VIEW, frame.watch, times)
+        closer = self._follow(replace(again, predicted=frame.predicted), state, goal)
         return closer if closer.verdict.rank <= verdict.rank else answer
 
-    def _follow(
-        self, frame: Frame, state: TrackState, goal: Goal, predicted: RigidTransform
-    ) -> TrackedFrame:
-        """The bone near the start of a frame; `predicted` as of `judge_fits`."""
+    def _follow(self, frame: Frame, state: TrackState, goal: Goal) -> TrackedFrame:
+        """The bone near the start of a frame."""
         with self.begin_checks(frame) as checks:
+            frame = replace(frame, checks=checks, on_measured=checks.check)
             if state.is_glossy:
                 # What is mirrored will lead astray again.
-                best = self._judge_matte(frame, frame.start, goal, predicted, checks)
+                best = self._judge_matte(frame, frame.start, goal)
                 if best.verdict.status is Status.OK and is_little_occluded(best.verdict):
                     return best
             # Measure on the model (section 3.2.2, algorithm 2) and fit (equations 4 to 9), in
             # turns; check beside the fit; judge.
-            frame = replace(frame, on_measured=checks.check)
-            fits = self.near.find(frame)
             best = self.judge_fits(
-                frame, fits, goal, predicted, checks=checks,
+                frame, self.near.find(frame), goal,
                 is_enough=lambda verdict: not _asks_for_more(verdict, state),
             )  # fmt: skip
-            best = self.look_again(frame, best, goal, predicted, checks)
+            best = self.look_again(frame, best, goal)
             if is_misfit(best.verdict) and state.is_search_due and is_worth_a_search(best):
-                more = self.buried.find(frame)
-                best = self.judge_fits(frame, more, goal, predicted, best, checks, keeps_first=True)
+                buried = [self.judge.judge(frame, fit, goal) for fit in self.buried.find(frame)]
+                best = min([best, *buried], key=lambda one: one.verdict.rank)
         return best
 
-    def look_again(
+    def _search_places(
         self,
         frame: Frame,
-        answer: TrackedFrame,
+        places: Iterable[RigidTransform],
+        n_searches: int,
         goal: Goal,
-        predicted: RigidTransform,
-        checks: PairChecks | None = None,
+        best: TrackedFrame,
     ) -> TrackedFrame:
+        """The best of an answer and of searches around places (left camera from bone), until an OK.
+
+        Only around the first place a search goes further off, as `n_searches` asks for.
+        """
+        for number, place in enumerate(places):
+            there = self.begin(frame.pictures, place, watch=frame.watch, times=frame.times)
+            there = replace(there, predicted=frame.predicted)
+            fits = self.after_loss.find(there, 0 if number else n_searches)
+            best = self.judge_fits(there, fits, goal, best)
+            if best.verdict.status is Status.OK:
+                break
+        return best
+
+    def look_again(self, frame: Frame, answer: TrackedFrame, goal: Goal) -> TrackedFrame:
         """What the same pictures say without what is mirrored in the bone, if OK and better.
 
         Else the answer as it is: of two that are refused the first has seen more. One that surely
@@ -173,29 +155,19 @@ class BimccTracker(Tracker):
             frame: of the answer.
             answer: looked at again when it is DEGRADED or fits loosely, and little hides the bone.
             goal: of the stage.
-            predicted: as of `judge_fits`.
-            checks: as of `judge_fits`.
         """
         pose = answer.left_from_bone
         is_worth_it = self._looks_again and is_worth_a_second_look(answer.verdict)
         if pose is None or not is_worth_it or Reason.SIZE_DIFFERS in answer.verdict.reasons:
             return answer
-        again = self._judge_matte(frame, self.rectify_pose(pose), goal, predicted, checks)
+        again = self._judge_matte(frame, self.rectify_pose(pose), goal)
         before, after = answer.verdict, again.verdict
         is_better = before.status is not Status.OK or after.spread_ratio <= before.spread_ratio
         return again if after.status is Status.OK and is_better else answer
 
-    def _judge_matte(
-        self,
-        frame: Frame,
-        pose: RigidTransform,
-        goal: Goal,
-        predicted: RigidTransform,
-        checks: PairChecks | None,
-    ) -> TrackedFrame:
+    def _judge_matte(self, frame: Frame, pose: RigidTransform, goal: Goal) -> TrackedFrame:
         """The bone near a pose, in pictures without highlights; lost where none are seen."""
-        fits = self.highlights.find(frame, pose)
-        answer = self.judge_fits(frame, fits, goal, predicted, checks=checks)
+        answer = self.judge_fits(frame, self.highlights.find(frame, pose), goal)
         return replace(answer, is_matte=True)
 
     def find_for_glance(self, frame: Frame) -> Iterable[Fit | None]:
@@ -203,15 +175,10 @@ class BimccTracker(Tracker):
         return self.near.find_on_model(frame)
 
     def register(
-        self,
-        left: Image,
-        right: Image,
-        prior: Prior,
-        goal: Goal,
-        on_progress: Callable[[float], None] = ignore,
+        self, pictures: StereoPictures, prior: Prior, goal: Goal, on_progress: Progress = ignore
     ) -> list[TrackedFrame]:
         """Find the bone from a rough pose, a box or a cone: distinct candidates, best first."""
-        return FirstRegistration(self).register(left, right, prior, goal, on_progress)
+        return FirstRegistration(self).register(pictures, prior, goal, on_progress)
 
 
 def _is_searched_after_loss(verdict: Verdict, state: TrackState) -> bool:

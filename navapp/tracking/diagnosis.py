@@ -4,13 +4,12 @@ Asked only when a bone is not found: do the pictures fit when exchanged, or does
 image fit them?
 """
 
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
-from navapp.geometry.rectification import Image, RectifiedGeometry, RectifiedPair
+from navapp.geometry.rectification import RectifiedGeometry, RectifiedPair
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.registration import fit_bimcc, make_near_starts, select_poses
 from navapp.registration.multi_start import AMBIGUOUS_FRACTION
@@ -18,7 +17,8 @@ from navapp.stereo import are_swapped
 from navapp.tracking.frame import FREE_SETTINGS, Fit, ignore
 from navapp.tracking.scoring import FitScorer
 from navapp.tracking.surface_meter import WIDE_VIEW, Measurement, SurfaceMeter
-from navapp.values import DisparityMap, Reason, Status, TrackedFrame
+from navapp.values import DisparityMap, Reason, Status, StereoPictures, TrackedFrame
+from navapp.values.progress import Progress
 
 # What is said of a surface that was seen well enough, but is another one's.
 _UNFIT = frozenset({Reason.SURFACE_MISFIT, Reason.SEEN_THROUGH, Reason.OUTLIERS})
@@ -33,43 +33,42 @@ class Diagnosis:
 
     def explain_failure(
         self,
-        left: Image,
-        right: Image,
+        pictures: StereoPictures,
         around: RigidTransform | None,
         failed: TrackedFrame,
-        on_progress: Callable[[float], None] = ignore,
+        on_progress: Progress = ignore,
     ) -> Reason | None:
         """Why a first registration failed: swapped pictures, another side's or another surface.
 
         Args:
-            left: picture of the left camera.
-            right: of the right one.
+            pictures: in which it was looked for.
             around: rectified left camera from bone, where it was looked for; None everywhere.
             failed: the best answer.
             on_progress: told that it goes on; what it raises stops the search.
         """
         if failed.verdict.status is Status.LOST:
-            cause = self.explain_loss(left, right, around)
+            cause = self.explain_loss(pictures, around)
             if cause is not None:
                 return cause
         reasons = failed.verdict.reasons
         if around is None or not _UNFIT.intersection(reasons):
             return None
-        pair = self._meter.rectify(left, right, around, WIDE_VIEW)
+        pair = self._meter.rectify(pictures.left, pictures.right, around, WIDE_VIEW)
         cause = self._explain_misfit(pair, around, on_progress)
         # Nothing has shown yet that the plan is of this bone: that comes before what is not seen.
         return cause or (Reason.SURFACE_MISFIT if Reason.SURFACE_MISFIT in reasons else None)
 
     def explain_loss(
-        self, left: Image, right: Image, around: RigidTransform | None
+        self, pictures: StereoPictures, around: RigidTransform | None
     ) -> Reason | None:
         """Whether the pictures are swapped, around a pose or in the whole view."""
+        left, right = pictures.left, pictures.right
         given = self._meter.rectify_surroundings(left, right, around)
         exchanged, _ = self._meter.rectify_surroundings(right, left, around)
         return Reason.PICTURES_SWAPPED if are_swapped(*given, exchanged) else None
 
     def _explain_misfit(
-        self, pair: RectifiedPair, pose: RigidTransform, on_progress: Callable[[float], None]
+        self, pair: RectifiedPair, pose: RigidTransform, on_progress: Progress
     ) -> Reason | None:
         """Whether the mirrored bone explains the surface clearly better.
 
@@ -89,7 +88,7 @@ class Diagnosis:
         return Reason.OTHER_SIDE if is_better else None
 
     def _fit_best(
-        self, measured: Measurement, start: RigidTransform, on_progress: Callable[[float], None]
+        self, measured: Measurement, start: RigidTransform, on_progress: Progress
     ) -> Fit | None:
         """Of the fits that a start and tilts of it lead to, the one that explains most."""
         starts = make_near_starts(start, start.apply(self._meter.model.centre_mm))

@@ -1,11 +1,10 @@
 """The first registration: from a pose, picks, a box or a cone to judged poses, best first."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from navapp.geometry.rectification import Image
 from navapp.geometry.transform import RigidTransform
 from navapp.registration import (
     distinct,
@@ -18,8 +17,8 @@ from navapp.registration.verdict import Goal
 from navapp.tracking.frame import Fit, Frame
 from navapp.tracking.picked_landmarks import find_rough_poses
 from navapp.tracking.surface_meter import WIDE_BOX, Measurement
-from navapp.values import Pick, Prior, Reason, Status, Stopwatch, TrackedFrame
-from navapp.values.progress import tell_part
+from navapp.values import Pick, Prior, Reason, Status, StereoPictures, Stopwatch, TrackedFrame
+from navapp.values.progress import Progress, tell_part
 
 if TYPE_CHECKING:
     from navapp.tracking.bimcc_tracker import BimccTracker
@@ -36,46 +35,41 @@ class FirstRegistration:
         self._tracker, self._scorer = tracker, tracker.scorer
 
     def register(
-        self,
-        left: Image,
-        right: Image,
-        prior: Prior,
-        goal: Goal,
-        on_progress: Callable[[float], None],
+        self, pictures: StereoPictures, prior: Prior, goal: Goal, on_progress: Progress
     ) -> list[TrackedFrame]:
         """Distinct candidates, best first; see `Tracker.register`."""
         tracker, watch = self._tracker, Stopwatch()
         bone = tracker.model.bone.name
         start = prior.left_from_bone.get(bone)
         if start is None and (picks := prior.picks_of(bone)):
-            start = self._start_at_picks(left, right, picks)
+            start = self._start_at_picks(pictures, picks)
             if start is None:
                 return [tracker.judge.lost(Reason.NO_SURFACE, watch)]
         if start is not None:
-            frame = replace(tracker.begin(left, right, start, watch), on_progress=on_progress)
-            answers = self._register_around(frame, goal)
+            frame = tracker.begin(pictures, start, watch=watch)
+            answers = self._register_around(replace(frame, on_progress=on_progress), goal)
         elif prior.has_start(bone):
-            answers = self._register_anywhere(left, right, prior, goal, on_progress, watch)
+            answers = self._register_anywhere(pictures, prior, goal, on_progress, watch)
             start = answers[0].left_from_bone
         else:
             return []
         if answers[0].verdict.status is Status.OK:
             return answers
         around = None if start is None else tracker.rectify_pose(start)
-        cause = tracker.diagnosis.explain_failure(left, right, around, answers[0], on_progress)
+        cause = tracker.diagnosis.explain_failure(pictures, around, answers[0], on_progress)
         return [answer.with_cause(cause) for answer in answers]
 
     def _start_at_picks(
-        self, left: Image, right: Image, picks: Sequence[Pick]
+        self, pictures: StereoPictures, picks: Sequence[Pick]
     ) -> RigidTransform | None:
         """The pose that picked landmarks tell; None when too few of them are matched."""
         tracker = self._tracker
-        poses = find_rough_poses(left, right, picks, tracker.meter)
+        poses = find_rough_poses(pictures, picks, tracker.meter)
         if len(poses) < 2:
             return poses[0] if poses else None
 
         def score(pose: RigidTransform) -> float:
-            frame = tracker.begin(left, right, pose, Stopwatch())
+            frame = tracker.begin(pictures, pose)
             measured = tracker.meter.measure_freely(frame.pair, frame.start, WIDE_BOX)
             if measured is None or len(measured.cloud) == 0:
                 return -math.inf
@@ -97,7 +91,7 @@ class FirstRegistration:
             found = select_poses(self._scorer.find_poses(measured, starts, told))
             return [tracker.near.fit_nearby(frame, measured, pose) for pose in found]
 
-        centre_mm = frame.start.apply(tracker.centre_mm)
+        centre_mm = frame.start.apply(tracker.model.centre_mm)
         fits = fit_from(make_near_starts(frame.start, centre_mm), 0.0, _NEAR_PART)
         answers = self._look_again(frame, self._judge_distinct(frame, fits, goal), goal)
         if not _is_ok(answers):
@@ -125,14 +119,15 @@ class FirstRegistration:
             return answers
         # The bone is expected where it was found: the start may be far off.
         found = self._tracker.rectify_pose(pose)
-        return [self._tracker.look_again(frame, best, goal, found), *others]
+        frame = replace(frame, predicted=found)
+        return [self._tracker.look_again(frame, best, goal), *others]
 
     def _is_doubted(self, found: TrackedFrame, others: list[TrackedFrame]) -> bool:
         """Whether an answer at the same place has what no second look takes back."""
         pose, against = found.left_from_bone, {Reason.AMBIGUOUS, Reason.SIZE_DIFFERS}
         return pose is not None and any(
             one.left_from_bone is not None
-            and is_same_pose(pose, one.left_from_bone, self._tracker.centre_mm)
+            and is_same_pose(pose, one.left_from_bone, self._tracker.model.centre_mm)
             and not against.isdisjoint(one.verdict.reasons)
             for one in others
         )
@@ -146,25 +141,24 @@ class FirstRegistration:
 
     def _register_anywhere(
         self,
-        left: Image,
-        right: Image,
+        pictures: StereoPictures,
         prior: Prior,
         goal: Goal,
-        on_progress: Callable[[float], None],
+        on_progress: Progress,
         watch: Stopwatch,
     ) -> list[TrackedFrame]:
         """In a box, or in the whole view, without a pose to start from."""
         tracker = self._tracker
-        pair = tracker.whole_view.rectify(left, right, prior)
+        pair = tracker.whole_view.rectify(pictures.left, pictures.right, prior)
         watch.lap("rectify")
         scored = tracker.whole_view.find_poses(pair, prior, on_progress)
         watch.lap("estimate")
         poses = select_poses(scored)
-        found = [self._fit_pose(Frame(pair, pose, watch)) for pose in poses]
+        found = [self._fit_pose(Frame(pictures, pair, pose, watch)) for pose in poses]
         fits = [fit for fit in found if fit is not None]
         if not fits:
             return [tracker.judge.lost(Reason.NO_SURFACE, watch)]
-        frame = Frame(pair, poses[0], watch, rectify_coloured=tracker.colours_of(left, right))
+        frame = Frame(pictures, pair, poses[0], watch)
         return self._look_again(frame, self._judge_distinct(frame, fits, goal), goal)
 
     def _fit_pose(self, frame: Frame) -> Fit | None:
@@ -177,7 +171,7 @@ class FirstRegistration:
     def _judge_distinct(self, frame: Frame, fits: list[Fit], goal: Goal) -> list[TrackedFrame]:
         """Distinct answers, best first; the best says so when it is ambiguous."""
         fits = self._scorer.rank(fits)
-        kept = distinct([fit.pose for fit in fits], self._tracker.centre_mm)
+        kept = distinct([fit.pose for fit in fits], self._tracker.model.centre_mm)
         # Checks of its own for each: several may have been fitted to one free measurement.
         return [self._tracker.judge.judge(frame, fit, goal) for fit in fits if fit.pose in kept]
 

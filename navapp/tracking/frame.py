@@ -3,15 +3,15 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from navapp.geometry.box import Box
 from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.transform import RigidTransform
 from navapp.registration import BimccSettings
 from navapp.registration.step_kernels import noise_under_kernel_mm2
-from navapp.stereo import NearerSearch
+from navapp.tracking.checks import PairChecks
 from navapp.tracking.row_times import RowTimes
 from navapp.tracking.surface_meter import FREE_CORRELATION_PX, MODEL_CORRELATION_PX, Measurement
-from navapp.values import PoseEstimate, Reason, Stopwatch
+from navapp.values import PoseEstimate, Reason, StereoPictures, Stopwatch
+from navapp.values.progress import Progress
 
 # Kernels of the fits: points that were measured freely know their noise, but not all of their
 # errors; on the model a kernel as narrow as the noise costs little, and keeps out tissue that lies
@@ -23,7 +23,6 @@ MODEL_SETTINGS = BimccSettings(narrowest_mm=0.2, n_sigmas=1.2)
 # which lie in the open, show at most so much (tests.bench.correlated_residuals).
 NOISE_VARIANCE_RATIO = 0.65**2
 
-RectifyBox = Callable[[Box, tuple[float, float]], RectifiedPair]
 OnMeasured = Callable[[Measurement, RigidTransform], object]
 
 
@@ -35,20 +34,19 @@ def ignore(*_: object) -> None:
 class Frame:
     """A rectified pair, where the bone is expected in it, and what is asked of a search."""
 
+    pictures: StereoPictures  # that were rectified
     pair: RectifiedPair  # grey pictures, rectified as far around the bone as is looked
     start: RigidTransform  # rectified left camera from bone, expected
     watch: Stopwatch
-    nearer: NearerSearch | None = None  # how to look for what stands before all of that
-    # the same pictures in their colours, a box of them as far as a band of disparities reaches;
-    # None of grey ones.
-    rectify_coloured: RectifyBox | None = None
+    # as `start`, as the motion lets expect; None when nothing is known of it.
+    predicted: RigidTransform | None = None
+    checks: PairChecks | None = None  # of the pair, begun
     # when the rows of the pictures see a moving bone; None where they see it all at once.
     times: RowTimes | None = None
-    n_searches: int = 0  # made since the bone was lost; the next one goes further off if odd
     # told what is measured on all of the model near `start`, and at which pose.
     on_measured: OnMeasured = ignore
     # told the fraction done of a long search; what it raises stops the search.
-    on_progress: Callable[[float], None] = ignore
+    on_progress: Progress = ignore
 
 
 @dataclass(frozen=True, slots=True, eq=False)

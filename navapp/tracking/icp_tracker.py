@@ -4,11 +4,10 @@ Source: the paper, section 3.1, figure 1 and algorithm 1. It is there to be comp
 accepts hardly any of its poses.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from contextlib import nullcontext
 from dataclasses import replace
 
-from navapp.geometry.rectification import Image
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
 from navapp.registration import estimate_at, solve_icp
@@ -35,9 +34,11 @@ from navapp.values import (
     PoseEstimate,
     Prior,
     Reason,
+    StereoPictures,
     Stopwatch,
     TrackedFrame,
 )
+from navapp.values.progress import Progress
 
 # With 20,000 points the error is the same within a tenth: `python -m tests.bench.paper_points`.
 N_POINTS = 3000
@@ -64,30 +65,23 @@ class IcpTracker(Tracker):
         self._contour = ContourRefiner(self.model, outline)
 
     def track(
-        self,
-        left: Image,
-        right: Image,
-        captured_ns: int,
-        state: TrackState,
-        goal: Goal,
-        skew_ns: int = 0,
+        self, pictures: StereoPictures, state: TrackState, goal: Goal
     ) -> tuple[TrackedFrame, TrackState]:
         """Follow the bone's box into the next frame, and fit in it (section 3.1)."""
-        watch = Stopwatch()
-        is_near = state.n_lost == 0
-        left_from_bone = state.predict(captured_ns, self.centre_mm)
+        watch, is_near = Stopwatch(), state.n_lost == 0
+        left_from_bone = state.predict(pictures.captured_ns, self.model.centre_mm)
         # The box comes from the pictures, and the start from the box.
-        box = self.boxes.follow(state.box, left, state.left_from_bone)
+        box = self.boxes.follow(state.box, pictures.left, state.left_from_bone)
         expected = self.boxes.starts(left_from_bone, box)[0]
-        times = RowTimes.of_pair(self.meter, state, captured_ns, skew_ns)
-        margins = NEAR_VIEW if is_near else WIDE_VIEW
-        frame = self.begin(left, right, expected, watch, margins, times)
-        predicted = self.rectify_pose(left_from_bone)
+        times = RowTimes.of_pair(self.meter, state, pictures)
+        view, margins = (NEAR_VIEW, NEAR_BOX) if is_near else (WIDE_VIEW, WIDE_BOX)
+        frame = self.begin(pictures, expected, view, watch, times)
+        frame = replace(frame, predicted=self.rectify_pose(left_from_bone))
         with self.begin_checks(frame) if is_near else nullcontext() as checks:
-            fits = [self.find_fit(frame, NEAR_BOX if is_near else WIDE_BOX)]
-            best = self.judge_fits(frame, fits, goal, predicted, checks=checks)
-        best = best.with_cause(self.find_cause(left, right, left_from_bone, state, best))
-        return self.update(best, replace(state, box=box), left, captured_ns, watch)
+            fits = [self.find_fit(frame, margins)]
+            best = self.judge_fits(replace(frame, checks=checks), fits, goal)
+        best = best.with_cause(self.find_cause(frame, state, best))
+        return self.update(best, replace(state, box=box), frame)
 
     def find_fit(self, frame: Frame, margins: Margins) -> Fit | None:
         """The fit around the start; None out of view."""
@@ -140,18 +134,13 @@ class IcpTracker(Tracker):
         return [self.find_fit(frame, NEAR_BOX)]
 
     def register(
-        self,
-        left: Image,
-        right: Image,
-        prior: Prior,
-        goal: Goal,
-        on_progress: Callable[[float], None] = ignore,
+        self, pictures: StereoPictures, prior: Prior, goal: Goal, on_progress: Progress = ignore
     ) -> list[TrackedFrame]:
         """The one fit that a rough pose leads to; nothing without a pose."""
         start = prior.left_from_bone.get(self.model.bone.name)
         if start is None:
             return []
-        frame = self.begin(left, right, start, Stopwatch())
+        frame = self.begin(pictures, start)
         fit = self.find_fit(frame, WIDE_BOX)
         if fit is None or len(fit.measured.cloud) == 0:
             return [self.judge.lost(Reason.NO_SURFACE, frame.watch)]

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.rig import RigQuality
-from navapp.geometry.transform import FloatArray, RigidTransform
+from navapp.geometry.transform import FloatArray
 from navapp.geometry.zbuffer import RenderedView
 from navapp.registration.verdict import (
     OK_ERROR_MM,
@@ -24,7 +24,6 @@ from navapp.tracking.following import RestSettings
 from navapp.tracking.foreground import find_foreground
 from navapp.tracking.frame import NOISE_VARIANCE_RATIO, Fit, Frame
 from navapp.tracking.outline import NoOutline, OutlineMeter
-from navapp.tracking.row_times import RowTimes
 from navapp.tracking.surface_meter import SurfaceMeter
 from navapp.values import (
     Foreground,
@@ -71,37 +70,29 @@ class PoseJudge:
         self._is_rig_accepted = quality is None or quality.is_accepted
         self._outline = outline or OutlineMeter(meter.model, meter.geometry)
 
-    def judge(
-        self,
-        frame: Frame,
-        fit: Fit | None,
-        goal: Goal,
-        predicted: RigidTransform | None = None,
-        checks: PairChecks | None = None,
-    ) -> TrackedFrame:
+    def judge(self, frame: Frame, fit: Fit | None, goal: Goal) -> TrackedFrame:
         """The answer that a fit gives, in the left camera before rectification.
 
         Args:
-            frame: that it was fitted in.
+            frame: that it was fitted in; without checks they are made here.
             fit: None out of view.
             goal: of the stage.
-            predicted: rectified left camera from bone, as the motion lets expect.
-            checks: of that frame's pair, begun; made here without.
         """
         if fit is None:
             return self.lost(Reason.OUT_OF_VIEW, frame.watch)
         model = self._meter.model
-        checks = checks or PairChecks(self._meter, frame.pair)
+        checks = frame.checks or PairChecks(self._meter, frame.pair)
         check = checks.check(fit.measured, fit.pose).result()
         depth_mm = float(fit.pose.apply(model.centre_mm)[2])
         fit, view, agreement = self._settle(frame, fit, check)
         evidence = self._evidence_of_pair(check.health, depth_mm)
-        evidence = self._evidence_of_pose(evidence, fit, agreement, goal, predicted, frame.times)
+        evidence = self._evidence_of_pose(evidence, frame, fit, agreement, goal)
         verdict = decide(evidence)
         if self._believes_all and verdict.predicted_tre_mm is not None:
             verdict = replace(verdict, status=Status.OK, reasons=())
         is_told = verdict.predicted_tre_mm is not None or self._tells_refused
-        estimate = self._unrectify(_at_seen_rows(frame, fit)) if is_told else None
+        turn = self._meter.geometry.rectified_from_left.inverse()
+        estimate = _at_seen_rows(frame, fit).turn_camera(turn) if is_told else None
         rows = _check_rows(check.health, evidence, verdict)
         frame.watch.lap("judge")
         foreground = None
@@ -196,11 +187,10 @@ class PoseJudge:
     def _evidence_of_pose(
         self,
         known: Evidence,
+        frame: Frame,
         fit: Fit,
         agreement: Agreement | None,
         goal: Goal,
-        predicted: RigidTransform | None,
-        times: RowTimes | None,
     ) -> Evidence:
         """With what a fit and its agreement with the measurement say."""
         model, estimate = self._meter.model, fit.estimate
@@ -215,7 +205,7 @@ class PoseJudge:
         cartilage_sd_mm = float(np.sqrt(np.mean(seen_sd_mm**2))) if len(seen_sd_mm) else 0.0
         plan_mm = _COMMON_ERROR_SIGMAS * math.hypot(cartilage_sd_mm, model.bone.surface_sd_mm)
         seen_error_mm = self._bound_mm(estimate, goal.targets_mm, is_seen)
-        motion_mm = 0.0 if times is None else times.error_mm(estimate.camera_from_bone)
+        motion_mm = 0.0 if frame.times is None else frame.times.error_mm(fit.pose)
         bound_mm = math.hypot(seen_error_mm, plan_mm, self._error_of_rig_mm(estimate), motion_mm)
         size_excess_mm = math.nan
         if (sized := estimate.sized) is not None:
@@ -224,8 +214,8 @@ class PoseJudge:
             size_limit_mm = max(OK_ERROR_MM, _SURE_SIGMAS * size_sigma_mm)
             size_excess_mm = abs(sized.growth_mm) - size_limit_mm
         twist = np.zeros(6)
-        if predicted is not None:
-            twist = predicted.twist_to(estimate.camera_from_bone, model.centre_mm)
+        if frame.predicted is not None:
+            twist = frame.predicted.twist_to(fit.pose, model.centre_mm)
         return replace(
             known,
             estimate=estimate,
@@ -261,10 +251,6 @@ class PoseJudge:
             return float("inf")
         step = max(1, len(index) // _MOST_TARGETS)
         return estimate.predict_tre_mm(model.centre_mm, points_mm[index[::step]])
-
-    def _unrectify(self, estimate: PoseEstimate) -> PoseEstimate:
-        """The same estimate in the left camera before rectification: a pure rotation."""
-        return estimate.turn_camera(self._meter.geometry.rectified_from_left.inverse())
 
 
 def _check_rows(health: StereoHealth, evidence: Evidence, verdict: Verdict) -> RowCheck | None:

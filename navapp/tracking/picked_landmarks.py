@@ -8,11 +8,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from navapp.geometry.box import Box
-from navapp.geometry.rectification import Image
 from navapp.geometry.transform import FloatArray, RigidTransform, nearest_rotation
 from navapp.stereo import match_surface
 from navapp.tracking.surface_meter import SurfaceMeter
-from navapp.values import FEWEST_PICKS, DisparityMap, Origin, Pick
+from navapp.values import FEWEST_PICKS, DisparityMap, Pick, StereoPictures
 
 # All chosen. A pick lies as deep as what is matched around it; a picture is measured a little
 # further than that.
@@ -23,7 +22,7 @@ _LEAST_WIDTH_MM, _N_TURNS = 6.0, 12
 
 
 def find_rough_poses(
-    left: Image, right: Image, picks: Sequence[Pick], meter: SurfaceMeter
+    pictures: StereoPictures, picks: Sequence[Pick], meter: SurfaceMeter
 ) -> list[RigidTransform]:
     """Left camera from bone, where the picked landmarks have it.
 
@@ -31,7 +30,7 @@ def find_rough_poses(
         One pose; several, turned about their line, when the landmarks lie on one; none when fewer
         than three of them have a depth.
     """
-    seen_mm = measure_picks_mm(left, right, picks, meter)
+    seen_mm = measure_picks_mm(pictures, picks, meter)
     is_known = np.isfinite(seen_mm).all(axis=1)
     if is_known.sum() < FEWEST_PICKS:
         return []
@@ -40,7 +39,7 @@ def find_rough_poses(
 
 
 def measure_picks_mm(
-    left: Image, right: Image, picks: Sequence[Pick], meter: SurfaceMeter
+    pictures: StereoPictures, picks: Sequence[Pick], meter: SurfaceMeter
 ) -> FloatArray:
     """(N, 3) of the picks in the left camera; NaN where nothing is matched around one."""
     geometry, rig = meter.geometry, meter.rectifier.rig
@@ -51,6 +50,7 @@ def measure_picks_mm(
     if around is None:
         return np.full((len(picks), 3), np.nan)
     box = around.grow(_AROUND_PX + _SPARE_PX)
+    left, right = pictures.left, pictures.right
     pair = meter.rectifier.rectify(left, right, box, meter.band_px, is_grey=True)
     if pair.box.is_empty:
         return np.full((len(picks), 3), np.nan)
@@ -66,10 +66,8 @@ def measure_picks_mm(
 def _disparity_around(found: DisparityMap, at_px: FloatArray) -> float:
     """Median of what is matched around a place in the rectified left view; NaN without any."""
     x, y = (round(float(value)) for value in at_px)
-    first_x, first_y = max(x - found.x - _AROUND_PX, 0), max(y - found.y - _AROUND_PX, 0)
-    rows = slice(first_y, max(y - found.y + _AROUND_PX + 1, 0))
-    columns = slice(first_x, max(x - found.x + _AROUND_PX + 1, 0))
-    matched = found.disparity_px[rows, columns][found.origin[rows, columns] == Origin.MATCHED]
+    _, there = Box(x, y, 1, 1).grow(_AROUND_PX).shared_slices(found.box)
+    matched = found.disparity_px[there][found.is_matched[there]]
     return float(np.median(matched)) if len(matched) else float("nan")
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.tracking.motion import TrackState
 from navapp.tracking.surface_meter import Margins, SurfaceMeter
-from navapp.values import DisparityMap
+from navapp.values import DisparityMap, StereoPictures
 
 _NO_MARGINS = Margins(box_px=0, band_mm=0.0)
 # A row counts as one that shows the bone when so many of its pixels are matched; chosen.
@@ -49,9 +49,10 @@ class RowTimes:
 
     @classmethod
     def of_pair(
-        cls, meter: SurfaceMeter, state: TrackState, captured_ns: int, skew_ns: int
+        cls, meter: SurfaceMeter, state: TrackState, pictures: StereoPictures
     ) -> "RowTimes | None":
         """With the velocity of earlier frames; None without a row delay or a skew."""
+        captured_ns, skew_ns = pictures.captured_ns, pictures.skew_ns
         if meter.rectifier.rig.row_delay_ns == 0 and skew_ns == 0:
             return None
         turn = meter.geometry.rectified_from_left

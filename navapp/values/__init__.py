@@ -44,6 +44,7 @@ from navapp.values.measured import (
 from navapp.values.pictures import DEPTH_COLOURS, OverlayMode, OverlayPicture
 from navapp.values.plans import FEWEST_PICKS, Pick, Plan, Prior, StageSpec, find_crowded
 from navapp.values.reasons import Reason
+from navapp.values.stereo_pictures import StereoPictures
 from navapp.values.timings import FrameTimings, Stopwatch
 from navapp.values.verdicts import Status, TrackedFrame, Verdict
 
@@ -90,6 +91,7 @@ __all__ = [
     "StageSpec",
     "Status",
     "StepKind",
+    "StereoPictures",
     "Stopwatch",
     "SurfaceCloud",
     "SurgicalContent",

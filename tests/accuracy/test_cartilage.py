@@ -40,11 +40,11 @@ def tracked(seed: int, make) -> tuple[tuple[TrackedFrame, float], ...]:
     bone = BoneModel("femur", case.mesh)
     turn = np.radians(1.0) * np.array([0.6, -0.64, 0.48])
     twist = np.concatenate([[0.5, -0.5, 0.7], turn])
-    start = case.poses[0].move(twist, case.poses[0].apply(tracker.centre_mm))
+    start = case.poses[0].move(twist, case.poses[0].apply(tracker.model.centre_mm))
     state = TrackState.at_rest(start, case.frames[0].captured_ns)
     found = []
     for frame, true in zip(case.frames, case.poses, strict=True):
-        answer, state = tracker.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
+        answer, state = tracker.track(frame, state, GOAL)
         assert answer.left_from_bone is not None
         error_mm = compute_mean_tre_mm(answer.left_from_bone, true, bone, np.empty((0, 3)))
         found.append((answer, error_mm))
@@ -78,7 +78,7 @@ def test_a_bone_that_is_known_better_in_parts_is_found_from_its_nominal_pose(see
     tracker = make_tracker(case.world.rig, mapped(case))
     first = case.frames[0]
     prior = Prior({"femur": case.world.nominal_left_from_femur})
-    answer = tracker.register(first.left, first.right, prior, GOAL)[0]
+    answer = tracker.register(first, prior, GOAL)[0]
     assert answer.verdict.status is Status.OK
     bone = BoneModel("femur", case.mesh)
     assert (

@@ -57,12 +57,12 @@ def run(seed: int, side: Side) -> tuple[Judged, ...]:
         )  # fmt: skip
 
     frame = knee.camera.read(1.0)
-    first = tracker.register(frame.left, frame.right, knee.prior, GOAL)[0]
+    first = tracker.register(frame, knee.prior, GOAL)[0]
     judge(frame, first)
     state = TrackState.at_rest(first.left_from_bone, frame.captured_ns)
     for _ in range(N_TRACKED):
         frame = knee.camera.read(1.0)
-        tracked, state = tracker.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
+        tracked, state = tracker.track(frame, state, GOAL)
         judge(frame, tracked)
     return tuple(judged)
 

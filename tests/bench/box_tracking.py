@@ -109,7 +109,7 @@ class Scene:
 
     def registered(self, frame: StereoFrame) -> RigidTransform | None:
         """The first pose, found from the nominal one."""
-        found = self.tracker.register(frame.left, frame.right, self.knee.prior, GOAL)
+        found = self.tracker.register(frame, self.knee.prior, GOAL)
         return found[0].left_from_bone if found else None
 
     def overlap(self, box: PictureBox | None, truth: RigidTransform) -> tuple[float, float]:
@@ -172,9 +172,7 @@ def follow_pose(scene: Scene, n_frames: int) -> str:
             start = scene.registered(frame)
             assert start is not None
             state = TrackState.at_rest(start, frame.captured_ns)
-        answer, state = scene.tracker.track(
-            frame.left, frame.right, frame.captured_ns, state, GOAL
-        )  # fmt: skip
+        answer, state = scene.tracker.track(frame, state, GOAL)
         status = answer.verdict.status
         statuses += status.value[0]
         seen = scene.overlap(None, truth)[1]
@@ -198,7 +196,7 @@ def follow_baseline(scene: Scene, n_frames: int) -> str:
             start = scene.registered(frame)
             assert start is not None
             state = TrackState.at_rest(start, frame.captured_ns)
-        answer, state = tracker.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
+        answer, state = tracker.track(frame, state, GOAL)
         n_ok += answer.verdict.status is Status.OK
         box = None if state.box is None else state.box.picture_box
         overlaps.append(scene.overlap(box, truth)[0])

@@ -41,7 +41,7 @@ def main() -> int:
         true = knee.oracle.left_from_body("tibia", frame.captured_ns)
         started = time.perf_counter()
         prior = Prior({"tibia": off(true, tracker, seed)})
-        tracked = tracker.register(frame.left, frame.right, prior, _GOAL)[0]
+        tracked = tracker.register(frame, prior, _GOAL)[0]
         took_s = time.perf_counter() - started
         pose, verdict = tracked.left_from_bone, tracked.verdict
         error = "-"
@@ -65,7 +65,7 @@ def off(true: RigidTransform, tracker: Tracker, seed: int) -> RigidTransform:
     rng = np.random.default_rng([seed, 9])
     axis, shift = (one / np.linalg.norm(one) for one in rng.normal(size=(2, 3)))
     twist = np.concatenate([_OFF_MM * shift, np.radians(_OFF_DEG) * axis])
-    return true.move(twist, true.apply(tracker.centre_mm))
+    return true.move(twist, true.apply(tracker.model.centre_mm))
 
 
 if __name__ == "__main__":

@@ -133,7 +133,7 @@ def followed(known: Patient, bone: BoneModel) -> Iterator[Row]:
     """Register in the first frame, track through the others."""
     tracker = BimccTracker(known.world.rig, bone)
     first = known.frames[0]
-    answers = tracker.register(first.left, first.right, nominal_prior(known.world), GOAL)
+    answers = tracker.register(first, nominal_prior(known.world), GOAL)
     if not answers or answers[0].left_from_bone is None:
         yield _lost(known.seed, 0, "no candidate")
         return
@@ -141,7 +141,7 @@ def followed(known: Patient, bone: BoneModel) -> Iterator[Row]:
     yield _row(known, 0, tracked, tracker)
     state = TrackState.at_rest(tracked.left_from_bone, first.captured_ns)
     for number, frame in enumerate(known.frames[1:], start=1):
-        tracked, state = tracker.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
+        tracked, state = tracker.track(frame, state, GOAL)
         yield _row(known, number, tracked, tracker)
 
 
@@ -151,7 +151,7 @@ def _row(known: Patient, number: int, tracked: TrackedFrame, tracker: BimccTrack
     if pose is None:
         return _lost(known.seed, number, reasons)
     frame = known.frames[number]
-    free = tracker.assess(frame.left, frame.right, pose, GOAL).verdict
+    free = tracker.assess(frame, pose, GOAL).verdict
     bone = BoneModel("femur", known.mesh, known.side)
     return Row(
         known.seed,

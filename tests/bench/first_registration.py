@@ -137,7 +137,7 @@ def register_all(options: argparse.Namespace) -> dict[tuple[str, str], list[Answ
                     continue
                 tracker = trackers["+" in way]
                 if not found:  # compiles
-                    tracker.register(frame.left, frame.right, prior, _GOAL)
+                    tracker.register(frame, prior, _GOAL)
                 answer = registered(tracker, frame, prior)
                 found.setdefault((frame.group, way), []).append(answer)
                 if options.verbose:
@@ -170,7 +170,7 @@ def drawn_box(visible: np.ndarray, seed: int) -> tuple[int, int, int, int]:
 def registered(tracker: BimccTracker, frame: Frame, prior: Prior) -> Answer:
     """The best candidate against the truth."""
     started = time.perf_counter()
-    tracked = tracker.register(frame.left, frame.right, prior, _GOAL)
+    tracked = tracker.register(frame, prior, _GOAL)
     seconds = time.perf_counter() - started
     pose = tracked[0].left_from_bone if tracked else None
     if pose is None:

@@ -27,17 +27,17 @@ from numpy.typing import NDArray
 
 from navapp.geometry.box import Box
 from navapp.geometry.ply import read_ply
-from navapp.geometry.rectification import Image
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.rig_files import read_rig
 from navapp.geometry.transform import RigidTransform
 from navapp.tracking import Goal, TrackState, make_tracker
 from navapp.tracking.foreground import IN_FRONT_MM, NEAR_PX, find_foreground
 from navapp.tracking.tracker import Tracker
-from navapp.values import BoneModel, Origin, Status
+from navapp.values import BoneModel, Origin, Status, StereoPictures
 from sim_devices.scenario import Scenario
 from sim_devices.sensor import SensorModel
 from tests.knees import SimulatedKnee, stepped_camera
+from tests.pictures import Pictures
 
 Mask = NDArray[np.bool_]
 # By thresholds (px, mm): pixels of the occluder marked and in all, of the bone, guesses and all.
@@ -59,9 +59,7 @@ class Case:
     """One pair of pictures, and what its left one shows."""
 
     name: str
-    left: Image
-    right: Image
-    captured_ns: int
+    pictures: StereoPictures
     truth: RigidTransform  # left camera from bone
     is_occluder: Mask  # (H, W) hand or instrument
     is_bone: Mask  # (H, W)
@@ -140,9 +138,9 @@ def _judge(
     pictures: str | None,
 ) -> None:
     """Count one case for each pair of thresholds."""
-    state = TrackState.at_rest(case.truth, case.captured_ns)
+    state = TrackState.at_rest(case.truth, case.pictures.captured_ns)
     goal = Goal(np.empty((0, 3)), 2.0)
-    tracked, _ = tracker.track(case.left, case.right, case.captured_ns, state, goal)
+    tracked, _ = tracker.track(case.pictures, state, goal)
     if tracked.verdict.status is not Status.OK:
         return
     assert tracked.foreground is not None
@@ -181,7 +179,7 @@ def _draw(
     tracker: Tracker, case: Case, box: Box, found: Mask, inner: Mask, seen: Mask
 ) -> NDArray[np.uint8]:
     """Green: marked rightly; blue: missed; red: bone that is marked; yellow: marked elsewhere."""
-    pair = tracker.meter.rectifier.rectify(case.left, case.right)
+    pair = tracker.meter.rectifier.rectify(case.pictures.left, case.pictures.right)
     picture = pair.left[box.slices].copy()
     if picture.ndim == 2:
         picture = cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR)
@@ -221,7 +219,8 @@ def _recorded(phantom: Path) -> Iterator[Case]:
             for kind in ("occluder", "bone")
         )
         truth = RigidTransform("left", "femur", entry["T_leftcam_from_ct"]["femur"])
-        yield Case(f"{phantom.name}_{index:02d}", left, right, index, truth, occluder, bone)
+        pictures = Pictures(left, right, index)
+        yield Case(f"{phantom.name}_{index:02d}", pictures, truth, occluder, bone)
 
 
 def _simulated(knee: SimulatedKnee) -> Iterator[Case]:
@@ -236,7 +235,7 @@ def _simulated(knee: SimulatedKnee) -> Iterator[Case]:
         occluder, bone = (seen.body == seen.bodies.index(name) for name in ("hand", "femur"))
         truth = knee.world.left_from_body("femur", time_ns)
         name = f"{_SIMULATED}_{knee.world.scenario.seed}_{number:02d}"
-        yield Case(name, frame.left, frame.right, frame.captured_ns, truth, occluder, bone)
+        yield Case(name, frame, truth, occluder, bone)
 
 
 if __name__ == "__main__":

@@ -114,15 +114,15 @@ def walked_frame() -> Walk:
     frames = knee.frames(2 + _WARM_FRAMES)
     tracker, goal = make_tracker(knee.rig, knee.bone), Goal(np.empty((0, 3)), 2.0)
     first = frames[0]
-    best = tracker.register(first.left, first.right, knee.prior, goal)[0]
+    best = tracker.register(first, knee.prior, goal)[0]
     assert best.left_from_bone is not None
     state = TrackState.at_rest(best.left_from_bone, first.captured_ns)
     for frame in frames[1:-1]:
-        _, state = tracker.track(frame.left, frame.right, frame.captured_ns, state, goal)
+        _, state = tracker.track(frame, state, goal)
     walk, last = Walk(), frames[-1]
     _on_both_threads(lambda: sys.setprofile(walk))
     walk.is_on = True
-    tracked, _ = tracker.track(last.left, last.right, last.captured_ns, state, goal)
+    tracked, _ = tracker.track(last, state, goal)
     walk.is_on = False
     _on_both_threads(lambda: sys.setprofile(None))
     assert tracked.verdict.status is Status.OK, tracked.verdict

@@ -156,7 +156,7 @@ def _follow(
     for frame, true in list(pairs)[_STRIDE - 1 :: _STRIDE]:
         if true is None:
             raise AssertionError("simulated frames have a truth")
-        start = true.move(offsets, true.apply(tracker.centre_mm))
+        start = true.move(offsets, true.apply(tracker.model.centre_mm))
         judged = _judge_frame(tracker, frame, start, goal)
         if judged is None:
             yield None
@@ -174,7 +174,7 @@ def _judge_frame(
     usual, judging.decide = judging.decide, log.decide
     try:
         state = TrackState.at_rest(start, frame.captured_ns)
-        tracked, _ = tracker.glance(frame.left, frame.right, frame.captured_ns, state, goal)
+        tracked, _ = tracker.glance(frame, state, goal)
     finally:
         judging.decide = usual
     pose, evidence = tracked.left_from_bone, log.evidence_of(tracked.verdict)

@@ -99,8 +99,7 @@ def _search(knee: Knee) -> tuple[bool, float, float, float]:
     """Whether it is OK, its error, its bound, and the time in s."""
     hidden = OccludedTracker(knee.tracker, knee.femur, knee.true["femur"])
     search = KneeSearch(Hinge.of(knee.femur))
-    left, right = knee.frame.left, knee.frame.right
-    tracked = search.find(hidden, left, right, knee.true["femur"], _GOAL).tracked
+    tracked = search.find(hidden, knee.frame, knee.true["femur"], _GOAL).tracked
     pose, bound_mm = tracked.left_from_bone, tracked.verdict.predicted_tre_mm
     took_s = tracked.timings.total_ms / 1e3
     if pose is None or bound_mm is None:

@@ -96,7 +96,7 @@ def ours(recording: Recording) -> Way:
         if number == 0:
             state = TrackState.at_rest(recording.poses[0], frame.captured_ns)
         started = time.perf_counter()
-        tracked, state = tracker.track(frame.left, frame.right, frame.captured_ns, state, _GOAL)
+        tracked, state = tracker.track(frame, state, _GOAL)
         followed = time.perf_counter()
         assert tracked.verdict.status is Status.OK, tracked.verdict
         assert tracked.left_from_bone is not None

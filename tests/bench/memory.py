@@ -20,6 +20,7 @@ import numpy as np
 from navapp.tracking import Goal, TrackState, make_tracker
 from navapp.values import Status
 from tests.bench.line_speed import Recording
+from tests.pictures import Pictures
 
 _GOAL = Goal(np.empty((0, 3)), 2.0)
 _RENDERED, _FRAME_NS = 25, 66_666_667
@@ -77,7 +78,8 @@ def followed(recording: Recording, n_frames: int) -> Iterator[tuple[int, bool]]:
         place = min(number % period, period - number % period)
         frame = recording.frames[place]
         right = dark if number % period == period - 1 else frame.right
-        tracked, state = tracker.track(frame.left.copy(), right, number * _FRAME_NS, state, _GOAL)
+        pictures = Pictures(frame.left.copy(), right, number * _FRAME_NS)
+        tracked, state = tracker.track(pictures, state, _GOAL)
         is_ok = tracked.verdict.status is Status.OK
         if is_ok and tracked.left_from_bone is not None:
             recording.overlay(place, tracked.left_from_bone)

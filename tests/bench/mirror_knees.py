@@ -91,13 +91,12 @@ def follow_knee(seed: int) -> FollowedKnee:
     tracker, state, n_ok = make_tracker(knee.rig, plan.bones[BONE]), None, 0
     for _ in range(_MOST_FRAMES):
         frame = knee.camera.read(1.0)
-        pair = frame.left, frame.right
         if state is None:
-            tracked = tracker.register(*pair, knee.prior, _GOAL)[0]
+            tracked = tracker.register(frame, knee.prior, _GOAL)[0]
             if tracked.verdict.status is Status.OK:
                 state = TrackState.at_rest(tracked.left_from_bone, frame.captured_ns)
             continue
-        tracked, state = tracker.track(*pair, frame.captured_ns, state, _GOAL)
+        tracked, state = tracker.track(frame, state, _GOAL)
         n_ok = n_ok + 1 if tracked.verdict.status is Status.OK else 0
         if n_ok == _N_FOLLOWED:
             break

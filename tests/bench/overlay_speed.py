@@ -78,7 +78,7 @@ def _draws(opened: OpenedDevices, layers: tuple[str, ...]) -> dict[str, Callable
     state = TrackState.at_rest(truth, frame.captured_ns)
     tracker = make_tracker(opened.rig, plan.bones["femur"])
     goal = Goal(np.empty((0, 3)), 2.0)
-    tracked, _ = tracker.track(frame.left, frame.right, frame.captured_ns, state, goal)
+    tracked, _ = tracker.track(frame, state, goal)
     pose = tracked.left_from_bone
     assert pose is not None
     eye_view = true_display(draw_setup(np.random.default_rng(_SETUP_SEED))).view()

@@ -3,6 +3,7 @@
 usage: python -m tests.bench.paper_points [FOLDER]
 
 FOLDER (default: NAVAPP_DATA) is one of `tests.bench.recorded_accuracy`. The femur is registered
+from tests.pictures import Pictures
 from each sequence's prior and followed, refused or not, as `navapp replay --follow-refused` does;
 errors are those of all poses.
 """
@@ -28,6 +29,7 @@ from navapp.tracking.icp_tracker import N_POINTS, IcpTracker
 from navapp.tracking.paper_tracker import PaperTracker
 from navapp.tracking.tracker import TrackerSettings
 from navapp.values import Plan
+from tests.pictures import Pictures
 
 _MANY = 20_000
 _BONE, _SITUATIONS = "femur", ("patient", "instrument")
@@ -79,11 +81,12 @@ def follow(kind: type[IcpTracker], sequence: Path, plan: Plan, n_points: int) ->
             cv2.imread(str(sequence / f"{eye}_{entry['index']:04d}.jpg"))
             for eye in ("left", "right")
         )
+        pictures = Pictures(left, right, number * _PERIOD_NS)
         if state is None:
-            (found,) = tracker.register(left, right, prior, goal)
+            (found,) = tracker.register(pictures, prior, goal)
             assert found.left_from_bone is not None, "nothing was measured"
             state = TrackState.at_rest(found.left_from_bone, 0)
-        tracked, state = tracker.track(left, right, number * _PERIOD_NS, state, goal)
+        tracked, state = tracker.track(pictures, state, goal)
         pose = tracked.left_from_bone
         assert pose is not None, "nothing was measured"
         true = RigidTransform("left", _BONE, entry["T_leftcam_from_ct"][_BONE])

@@ -12,7 +12,7 @@ import argparse
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -130,17 +130,18 @@ def followed(
     state: TrackState | None = None
     for _ in range(n_frames):
         frame = camera.read(1.0)
-        left, right = (frame.right, frame.left) if is_swapped else (frame.left, frame.right)
+        if is_swapped:
+            frame = replace(frame, left=frame.right, right=frame.left)
         truth = world.left_from_body(
             "femur", loop.world_ns(camera.world_time_ns(frame.captured_ns))
         )
         if state is None:
             start = truth if from_truth else world.nominal_left_from_femur
-            tracked = tracker.register(left, right, Prior({"femur": start}), GOAL)[0]
+            tracked = tracker.register(frame, Prior({"femur": start}), GOAL)[0]
             found = None if from_truth else tracked.left_from_bone
             state = TrackState.at_rest(found or start, frame.captured_ns, tracked.verdict.cause)
         else:
-            tracked, state = tracker.track(left, right, frame.captured_ns, state, GOAL)
+            tracked, state = tracker.track(frame, state, GOAL)
         pose = tracked.left_from_bone
         yield (
             tracked,

@@ -58,7 +58,7 @@ def follow(motion: str, seed: int, n_frames: int) -> list[np.ndarray]:
     for frame in knee.frames(n_frames):
         if state is None:
             state = TrackState.at_rest(knee.truth(frame), frame.captured_ns)
-        tracked, state = tracker.track(frame.left, frame.right, frame.captured_ns, state, goal)
+        tracked, state = tracker.track(frame, state, goal)
         if tracked.verdict.status is not Status.OK:
             continue
         for k, delay_ms in enumerate(_DELAYS_MS):

@@ -202,12 +202,12 @@ def played(theatre: Theatre, tracker: Tracker, rate_hz: float, until_s: float) -
             return
         started = time.perf_counter()
         if state is None:
-            tracked = tracker.register(frame.left, frame.right, theatre.prior, GOAL)[0]
+            tracked = tracker.register(frame, theatre.prior, GOAL)[0]
             # Even what is not OK is taken: nothing here is easier than an operation.
             start = tracked.left_from_bone or theatre.prior.left_from_bone["femur"]
             state = TrackState.at_rest(start, frame.captured_ns)
         else:
-            tracked, state = tracker.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
+            tracked, state = tracker.track(frame, state, GOAL)
         took_ms = 1e3 * (time.perf_counter() - started)
         pose = tracked.left_from_bone
         tre_mm = (

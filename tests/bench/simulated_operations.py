@@ -81,9 +81,9 @@ def operated(seed: int, situation: str, n_frames: int) -> Operation:
     for number in range(n_frames):
         frame = knee.camera.read(1.0)
         if state is None:
-            tracked = tracker.register(frame.left, frame.right, knee.prior, _GOAL)[0]
+            tracked = tracker.register(frame, knee.prior, _GOAL)[0]
         else:
-            tracked, state = tracker.track(frame.left, frame.right, frame.captured_ns, state, _GOAL)
+            tracked, state = tracker.track(frame, state, _GOAL)
         answer = _answer(tracked, knee.truth(frame), knee.bone)
         if state is None and tracked.verdict.status is Status.OK:
             state = TrackState.at_rest(tracked.left_from_bone, frame.captured_ns)

@@ -29,6 +29,7 @@ from navapp.tracking import TrackState
 from navapp.tracking.surface_meter import WIDE_VIEW
 from navapp.values import BoneModel, Reason, Status
 from tests.bench.tracker_parts import GOAL, TrackerParts
+from tests.pictures import Pictures
 
 OFFSETS_PX = (0.0, 0.15, 0.3, 0.5, -0.5, 1.0)
 # Of a pair's pictures, beside its rows.
@@ -86,12 +87,13 @@ def _follow_points(rig: StereoRig, bone: BoneModel, sequence: Path) -> Iterator[
             cv2.imread(str(sequence / f"{side}_{entry['index']:04d}.jpg"))
             for side in ("left", "right")
         )
-        tracked, _ = tracker.track(left, right, 0, TrackState.at_rest(truth, 0), GOAL)
-        frame = tracker.frame(left, right, tracker.rectify_pose(truth), WIDE_VIEW)
+        pictures = Pictures(left, right)
+        tracked, _ = tracker.track(pictures, TrackState.at_rest(truth, 0), GOAL)
+        frame = tracker.begin(pictures, truth, WIDE_VIEW)
         fit = tracker.find(frame)
         if fit is None:
             continue
-        depth_mm = float(fit.pose.apply(tracker.centre_mm)[2])
+        depth_mm = float(fit.pose.apply(tracker.model.centre_mm)[2])
         started = time.perf_counter()
         pair, geometry = frame.pair, frame.pair.geometry
         health = measure_health(pair, fit.measured.disparity, geometry.disparity_px(depth_mm))

@@ -138,7 +138,7 @@ def guided(sequence: Sequence, n_seeds: int) -> None:
         for scene in sequence.scenes:
             for seed in range(n_seeds):
                 start = disturbed(scene.pose, parts.centre_mm, angle_deg, length_mm, seed)
-                frame = Frame(scene.pair, start, Stopwatch())
+                frame = Frame(None, scene.pair, start, Stopwatch())
                 fit = parts.find(frame)
                 before.append(tre_mm(start, scene.pose, sequence.mesh))
                 if fit is None:

@@ -132,7 +132,7 @@ def _measure(
     for _ in range(n_frames):
         frame: StereoFrame = camera.read(1.0)
         time_ns = camera.world_time_ns(frame.captured_ns)
-        tracked, state = tracker.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
+        tracked, state = tracker.track(frame, state, GOAL)
         if tracked.estimate is None or tracked.verdict.status is not Status.OK:
             continue
         bone_from_left = world.left_from_body("femur", time_ns).inverse()

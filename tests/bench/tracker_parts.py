@@ -13,6 +13,7 @@ from navapp.tracking.frame import Fit, Frame
 from navapp.tracking.outline import OutlineMeter
 from navapp.tracking.surface_meter import NEAR_VIEW, Margins
 from navapp.values import BoneModel, Stopwatch, Verdict
+from tests.pictures import Pictures
 
 GOAL = Goal(np.empty((0, 3)), 2.0)
 
@@ -28,7 +29,8 @@ class TrackerParts(BimccTracker):
         self, left: Image, right: Image, start: RigidTransform, margins: Margins = NEAR_VIEW
     ) -> Frame:
         """The pictures rectified around a pose in the rectified left camera."""
-        return Frame(self.meter.rectify(left, right, start, margins), start, Stopwatch())
+        pair = self.meter.rectify(left, right, start, margins)
+        return Frame(Pictures(left, right), pair, start, Stopwatch())
 
     def find(self, frame: Frame) -> Fit | None:
         """Of all fits near the start the one that the judge ranks first; None out of view.

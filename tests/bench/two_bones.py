@@ -9,6 +9,7 @@ on its own (`each`), or as it is (`forward`). A frame is exempt when the bound a
 exceeds 0.5 mm: where the tibia rests next to that pose, behind the femur at its true pose, as
 judged there; `--frames` lists them. Hip and ankle centre of the phantoms' plans are made up: they
 say where the axes are, for estimate and truth alike. With --knees, simulated sessions with seeds
+from tests.pictures import Pictures
 from SEED on are run instead: the tibia is looked for once the femur is accepted, and followed in
 its turns of 16 frames.
 """
@@ -43,8 +44,9 @@ from navapp.limb import BoneSurface, LimbMeter
 from navapp.preop import read_plan
 from navapp.tracking import Goal, make_tracker
 from navapp.tracking.bimcc_tracker import BimccTracker
-from navapp.values import Plan, PoseEstimate, Stopwatch
+from navapp.values import Plan, PoseEstimate
 from tests.bench.recorded_accuracy import find_sequences
+from tests.pictures import Pictures
 
 _FAR_JOINTS = """\
 [hip]
@@ -233,7 +235,7 @@ class PhantomBench:
             cv2.imread(str(sequence / f"{side}_{index:04d}.jpg"))[..., ::-1].copy()
             for side in ("left", "right")
         )
-        frame = hidden.begin(left, right, true["tibia"], Stopwatch())
+        frame = hidden.begin(Pictures(left, right), true["tibia"])
         fit = hidden.near._follower.follow(frame, frame.start, skips_samples=True)
         targets_mm = self._plan.targets.get("tibia", np.empty((0, 3)))
         judged = hidden.judge.judge(frame, fit, Goal(targets_mm, 2.0))

@@ -107,7 +107,7 @@ def track_sized(sequence: KnownSequence, size: float) -> Iterator[SizedFrame]:
         if true is None:
             raise AssertionError("simulated frames have a truth")
         state = TrackState.at_rest(true, frame.captured_ns)
-        tracked, _ = tracker.track(frame.left, frame.right, frame.captured_ns, state, goal)
+        tracked, _ = tracker.track(frame, state, goal)
         pose = tracked.left_from_bone
         error_mm = float("nan")
         if pose is not None:

@@ -51,7 +51,7 @@ def test_three_landmarks_make_a_prior_that_finds_the_bone(files, tmp_path) -> No
     prior = read_prior(out)
     a = room()
     frame = a.frames[0]
-    best = a.tracker.register(frame.left, frame.right, prior, GOAL)[0]
+    best = a.tracker.register(frame, prior, GOAL)[0]
     assert a.error_mm(best.left_from_bone, frame) < 0.3
     # What is there is kept.
     before = out.read_bytes()

@@ -127,7 +127,7 @@ class FakeTracker:
     def __init__(self, script: Script, bone: BoneModel) -> None:
         self.script, self.bone = script, bone
 
-    def register(self, left, right, prior, goal, on_progress=lambda share: None):
+    def register(self, pictures, prior, goal, on_progress=lambda share: None):
         self.script.calls.append(f"register {self.bone.name}")
         self.script.priors.append(prior)
         self.script.started.set()
@@ -139,13 +139,13 @@ class FakeTracker:
             raise self.script.error
         return list(self.script.found)
 
-    def track(self, left, right, captured_ns, state: TrackState, goal, skew_ns=0):
+    def track(self, pictures, state: TrackState, goal):
         self.script.calls.append(f"track {self.bone.name}")
-        return self._follow(captured_ns, state, goal)
+        return self._follow(pictures.captured_ns, state, goal)
 
-    def glance(self, left, right, captured_ns, state: TrackState, goal, skew_ns=0):
+    def glance(self, pictures, state: TrackState, goal):
         self.script.calls.append(f"glance at {self.bone.name}")
-        return self._follow(captured_ns, state, goal)
+        return self._follow(pictures.captured_ns, state, goal)
 
     def _follow(self, captured_ns, state: TrackState, goal):
         self.script.tracks.append((self.bone.name, state, goal))
@@ -153,7 +153,7 @@ class FakeTracker:
         tracked = self.script.tracked_of.get(self.bone.name, self.script.tracked)
         return tracked, state.update(tracked, captured_ns, np.zeros(3))
 
-    def assess(self, left, right, left_from_bone, goal):
+    def assess(self, pictures, left_from_bone, goal):
         self.script.calls.append(f"assess {self.bone.name}")
         tracked = self.script.assessed
         if tracked.estimate is None:

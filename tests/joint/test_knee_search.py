@@ -37,7 +37,7 @@ def test_a_tibia_is_found_from_the_femur_and_a_search_can_be_stopped(
     hidden = OccludedTracker(tracker, meshes["femur"], true["femur"])
     search = KneeSearch(Hinge.of(meshes["femur"]))
     told: list[float] = []
-    found = search.find(hidden, frame.left, frame.right, true["femur"], GOAL, told.append)
+    found = search.find(hidden, frame, true["femur"], GOAL, told.append)
     tracked = found.tracked
     error_mm = compute_mean_tre_mm(tracked.left_from_bone, true["tibia"], bone, GOAL.targets_mm)
     # The plain tracker's own search would call it ambiguous: that is not what was asked.
@@ -56,4 +56,4 @@ def test_a_tibia_is_found_from_the_femur_and_a_search_can_be_stopped(
             raise StopError
 
     with pytest.raises(StopError):
-        search.find(hidden, frame.left, frame.right, true["femur"], GOAL, stop)
+        search.find(hidden, frame, true["femur"], GOAL, stop)

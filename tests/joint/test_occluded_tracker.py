@@ -10,7 +10,7 @@ from navapp.joint.occluded_tracker import OccludedTracker, Occluder
 from navapp.tracking import TrackState
 from navapp.tracking.frame import NOISE_VARIANCE_RATIO
 from navapp.tracking.judging import PoseJudge
-from navapp.values import DisparityMap, Status, Stopwatch
+from navapp.values import DisparityMap, Status
 from tests.geometry.shapes import sphere
 from tests.registration.shapes import GEOMETRY
 from tests.tracking.rooms import GOAL, room
@@ -68,7 +68,7 @@ def test_behind_nothing_a_bone_is_judged_as_ever() -> None:
     a, hidden = hidden_room()
     frame = a.frames[0]
     state = TrackState.at_rest(a.truth(frame), frame.captured_ns)
-    args = frame.left, frame.right, frame.captured_ns, state, GOAL
+    args = frame, state, GOAL
     one, other = (tracker.glance(*args)[0] for tracker in (a.tracker, hidden))
     assert one.verdict.status is Status.OK
     assert other.verdict == one.verdict
@@ -81,7 +81,7 @@ def test_a_spread_makes_the_bound_larger_and_moves_nothing() -> None:
     frame = a.frames[0]
     poses = []
     for tracker in (plain, spread):
-        begun = tracker.begin(frame.left, frame.right, a.truth(frame), Stopwatch())
+        begun = tracker.begin(frame, a.truth(frame))
         fit = next(tracker.near.find_on_model(begun))
         poses.append(tracker.judge.judge(begun, fit, GOAL))
     assert (poses[0].left_from_bone.matrix == poses[1].left_from_bone.matrix).all()
@@ -95,13 +95,13 @@ def test_a_bone_that_is_hidden_for_the_most_part_does_not_lie_in_the_open() -> N
     a = room()
     frame = a.frames[0]
     start = a.truth(frame)
-    near = start.apply(a.tracker.centre_mm) * 0.9
+    near = start.apply(a.tracker.model.centre_mm) * 0.9
     bounds = {}
     for radius_mm in (1.0, 22.0):
         ball = sphere(radius_mm, 48)
         before = RigidTransform.from_parts("left", "ball", np.eye(3), near)
         hidden = OccludedTracker(a.tracker, ball, before)
-        begun = hidden.begin(frame.left, frame.right, start, Stopwatch())
+        begun = hidden.begin(frame, start)
         fit = next(hidden.near.find_on_model(begun))
         plain = PoseJudge(hidden.meter, a.rig.quality)
         bounds[radius_mm] = [

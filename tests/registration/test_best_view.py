@@ -9,7 +9,6 @@ from navapp.preop import build_aspects
 from navapp.registration.best_view import find_best_view
 from navapp.registration.hypotheses import Views, compute_poses, place_hypothesis
 from navapp.tracking.surface_meter import NEAR_BOX, WIDE_VIEW
-from navapp.values import Stopwatch
 from tests.tracking.rooms import cone, room
 
 
@@ -18,7 +17,7 @@ def scene():
     """A frame of the room, its tracker, and the edges of its bone."""
     a = room()
     frame, tracker = a.frames[0], a.tracker
-    begun = tracker.begin(frame.left, frame.right, a.truth(frame), Stopwatch(), WIDE_VIEW)
+    begun = tracker.begin(frame, a.truth(frame), WIDE_VIEW)
     box, _ = tracker.meter.find_region(begun.start, NEAR_BOX)
     return (
         replace(begun.pair, box=box),

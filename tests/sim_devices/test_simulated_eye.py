@@ -101,7 +101,7 @@ def test_guides_of_the_product_lie_on_the_bone_that_the_eye_sees() -> None:
     tracker = make_tracker(one.rig, one.bone)
     state = TrackState.at_rest(true, frame.captured_ns)
     goal = Goal(np.empty((0, 3)), 2.0)
-    tracked, _ = tracker.track(frame.left, frame.right, frame.captured_ns, state, goal)
+    tracked, _ = tracker.track(frame, state, goal)
     assert tracked.left_from_bone is not None
     view = MirrorView(true_display(SETUP).view(), one.rig)
     scene = Scene(

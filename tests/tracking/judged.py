@@ -79,6 +79,7 @@ def judged(
     judge = PoseJudge(meter, quality, SurfaceAlone())
     cloud = measured.reproject(GEOMETRY, 3)
     fit = Fit(estimate, Measurement(measured, lambda: cloud, 1.0, FREE_CORRELATION_PX))
-    frame = Frame(None, estimate.camera_from_bone, Stopwatch())
     checks = Told(PairCheck(health, None, None, np.zeros(measured.origin.shape, dtype=np.bool_)))
-    return judge.judge(frame, fit, goal or Goal(NO_TARGETS, 3.0), predicted, checks=checks)
+    start = estimate.camera_from_bone
+    frame = Frame(None, None, start, Stopwatch(), predicted=predicted, checks=checks)
+    return judge.judge(frame, fit, goal or Goal(NO_TARGETS, 3.0))

@@ -46,7 +46,7 @@ class Laps(Stopwatch):
 
 def frame_at(start: RigidTransform, watch: Stopwatch | None = None, **more) -> Frame:
     """Of no pictures: what these meters are handed is not looked at."""
-    return Frame(None, start, watch or Stopwatch(), **more)
+    return Frame(None, None, start, watch or Stopwatch(), **more)
 
 
 @dataclass

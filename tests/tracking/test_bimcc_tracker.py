@@ -15,8 +15,9 @@ from navapp.tracking.frame import FREE_SETTINGS, Fit
 from navapp.tracking.judging import PoseJudge
 from navapp.tracking.search.near import NearSearch
 from navapp.tracking.surface_meter import WIDE_BOX
-from navapp.values import FrameTimings, Prior, Reason, Status, Stopwatch, TrackedFrame, Verdict
+from navapp.values import FrameTimings, Prior, Reason, Status, TrackedFrame, Verdict
 from tests.many import few_of, few_rows_of
+from tests.pictures import Pictures
 from tests.tracking.meters import Listening
 from tests.tracking.rooms import GOAL, Room, room
 
@@ -24,11 +25,11 @@ from tests.tracking.rooms import GOAL, Room, room
 def follow(a: Room, tracker: BimccTracker, start_off=(0.0,) * 6):
     """Track through the room's frames, from a pose a little beside the first truth."""
     truth = a.truth(a.frames[0])
-    start = truth.move(start_off, truth.apply(tracker.centre_mm))
+    start = truth.move(start_off, truth.apply(tracker.model.centre_mm))
     state = TrackState.at_rest(start, a.frames[0].captured_ns)
     answers = []
     for frame in a.frames:
-        tracked, state = tracker.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
+        tracked, state = tracker.track(frame, state, GOAL)
         answers.append((frame, tracked))
     return answers, state
 
@@ -64,16 +65,16 @@ def test_grey_pictures_do_as_well() -> None:
 @pytest.mark.parametrize(("shape", "level"), [((720, 1280), 0), ((720, 1280, 3), 255)])
 def test_pictures_without_content_are_lost(shape, level: int) -> None:
     a = room()
-    flat = np.full(shape, level, dtype=np.uint8)
+    flat = Pictures(*np.full((2, *shape), level, dtype=np.uint8), 66_000_000)
     state = TrackState.at_rest(a.truth(a.frames[0]), 0)
-    tracked, after = a.tracker.track(flat, flat, 66_000_000, state, GOAL)
+    tracked, after = a.tracker.track(flat, state, GOAL)
     assert tracked.verdict.status is Status.LOST
     assert tracked.verdict.reasons
     assert tracked.left_from_bone is None
     assert after.left_from_bone is state.left_from_bone
-    found = a.tracker.register(flat, flat, a.prior, GOAL)
+    found = a.tracker.register(flat, a.prior, GOAL)
     assert all(one.verdict.status is Status.LOST for one in found)
-    assessed = a.tracker.assess(flat, flat, state.left_from_bone, GOAL)
+    assessed = a.tracker.assess(flat, state.left_from_bone, GOAL)
     assert assessed.verdict.status is Status.LOST
 
 
@@ -83,7 +84,7 @@ def test_one_dark_eye_is_lost(eye: str) -> None:
     frame = a.frames[0]
     dark = replace(frame, **{eye: np.zeros_like(frame.left)})
     state = TrackState.at_rest(a.truth(frame), frame.captured_ns)
-    tracked, _ = a.tracker.track(dark.left, dark.right, frame.captured_ns, state, GOAL)
+    tracked, _ = a.tracker.track(dark, state, GOAL)
     assert tracked.verdict.status is Status.LOST
 
 
@@ -93,13 +94,13 @@ def test_a_bone_out_of_view_is_lost_and_said_so(shift) -> None:
     frame = a.frames[0]
     away = a.truth(frame).move((*shift, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
     state = TrackState.at_rest(away, frame.captured_ns)
-    tracked, after = a.tracker.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
+    tracked, after = a.tracker.track(frame, state, GOAL)
     assert tracked.verdict.status is Status.LOST
     assert tracked.verdict.reasons == (Reason.OUT_OF_VIEW,)
     assert after.n_lost == 1
-    assessed = a.tracker.assess(frame.left, frame.right, away, GOAL)
+    assessed = a.tracker.assess(frame, away, GOAL)
     assert assessed.verdict.reasons == (Reason.OUT_OF_VIEW,)
-    found = a.tracker.register(frame.left, frame.right, Prior({"femur": away}), GOAL)
+    found = a.tracker.register(frame, Prior({"femur": away}), GOAL)
     assert [f.verdict.status for f in found] == [Status.LOST]
 
 
@@ -107,11 +108,11 @@ def test_a_pose_is_assessed_where_it_stands() -> None:
     a = room()
     frame = a.frames[0]
     truth = a.truth(frame)
-    right = a.tracker.assess(frame.left, frame.right, truth, GOAL)
+    right = a.tracker.assess(frame, truth, GOAL)
     assert right.verdict.status is not Status.LOST
     np.testing.assert_allclose(right.left_from_bone.matrix, truth.matrix, atol=1e-9)
-    turned = truth.move((0, 0, 0, 0, np.radians(15.0), 0), truth.apply(a.tracker.centre_mm))
-    wrong = a.tracker.assess(frame.left, frame.right, turned, GOAL)
+    turned = truth.move((0, 0, 0, 0, np.radians(15.0), 0), truth.apply(a.tracker.model.centre_mm))
+    wrong = a.tracker.assess(frame, turned, GOAL)
     assert wrong.verdict.status is Status.LOST
 
 
@@ -128,23 +129,24 @@ def lost_far_away(a: Room, n_seen: int = 2) -> TrackState:
     truth = a.truth(a.frames[0])
     state = TrackState.at_rest(truth, a.frames[0].captured_ns)
     for frame in a.frames[:n_seen]:
-        _, state = a.tracker.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
-    away = truth.move((70.0, 0, 0, 0, 0, 0), truth.apply(a.tracker.centre_mm))
+        _, state = a.tracker.track(frame, state, GOAL)
+    away = truth.move((70.0, 0, 0, 0, 0, 0), truth.apply(a.tracker.model.centre_mm))
     return replace(state, left_from_bone=away, n_lost=4)
 
 
 def test_the_box_leads_back_to_a_lost_bone() -> None:
     a = room()
     state, frame = lost_far_away(a), a.frames[2]
-    found, after = a.tracker.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
+    found, after = a.tracker.track(frame, state, GOAL)
     assert a.error_mm(found.left_from_bone, frame) < 1.2
     # So far from where it was expected, it has to be confirmed by the next frame.
     assert found.verdict.reasons == (Reason.JUMPED,)
     assert after.n_lost == 0
-    again, _ = a.tracker.track(frame.left, frame.right, frame.captured_ns + 66_000_000, after, GOAL)
+    later = replace(frame, captured_ns=frame.captured_ns + 66_000_000)
+    again, _ = a.tracker.track(later, after, GOAL)
     assert again.verdict.status is Status.OK
     boxless = replace(state, box=None)
-    found, _ = a.tracker.track(frame.left, frame.right, frame.captured_ns, boxless, GOAL)
+    found, _ = a.tracker.track(frame, boxless, GOAL)
     assert found.verdict.status is not Status.OK
 
 
@@ -161,16 +163,15 @@ class Never:
 def never_searching(near: NearSearch) -> BimccTracker:
     """A tracker that fails when it looks for more than where the model rests."""
     a = room()
-    near = Never(find_on_model=near.find_on_model)
-    return BimccTracker(
-        a.rig, a.tracker.model.bone, near=near, buried=Never(), after_loss=Never(),
-        diagnosis=Never(),
-    )  # fmt: skip
+    tracker = BimccTracker(a.rig, a.tracker.model.bone)
+    tracker.near = Never(find_on_model=near.find_on_model)
+    tracker.buried = tracker.after_loss = tracker.diagnosis = Never()
+    return tracker
 
 
 def glance(a: Room, state: TrackState, tracker: BimccTracker | None = None):
     frame, tracker = a.frames[2], tracker or a.tracker
-    return tracker.glance(frame.left, frame.right, frame.captured_ns, state, GOAL)
+    return tracker.glance(frame, state, GOAL)
 
 
 @pytest.mark.parametrize("n_lost", [0, 1, 5, 10])
@@ -191,9 +192,7 @@ def test_a_frame_that_is_tracked_asks_for_all_that_a_glance_does_not() -> None:
     a = room()
     state, frame = lost_far_away(a), a.frames[2]
     with pytest.raises(pytest.fail.Exception):
-        never_searching(a.tracker.near).track(
-            frame.left, frame.right, frame.captured_ns, state, GOAL
-        )
+        never_searching(a.tracker.near).track(frame, state, GOAL)
 
 
 @pytest.mark.parametrize(
@@ -206,26 +205,24 @@ def test_a_lost_bone_is_looked_for_in_every_frame_and_searched_in_some(
     a, asked = room(), []
     state, picture = replace(lost_far_away(a), n_lost=n_lost, n_searches=3), a.frames[2]
     tracker = BimccTracker(a.rig, a.tracker.model.bone)
-    tracker.after_loss = SimpleNamespace(find=lambda frame: asked.append(frame.n_searches) or [])
-    given = picture.left, picture.right, picture.captured_ns
-    _, after = tracker.track(*given, state, GOAL)
+    tracker.after_loss = SimpleNamespace(find=lambda _, n_searches: asked.append(n_searches) or [])
+    _, after = tracker.track(picture, state, GOAL)
     # Where its box lies, which may go further off, and where it was expected.
     assert asked == searches
     assert after.n_searches == (4 if searches else 3)
     near = replace(state, left_from_bone=a.truth(picture))
-    found, after = tracker.track(*given, near, GOAL)
+    found, after = tracker.track(picture, near, GOAL)
     assert found.verdict.status is Status.OK
     assert after.n_lost == after.n_searches == 0
 
 
 def test_a_doubted_place_ends_no_loss_before_the_bone_was_searched_elsewhere() -> None:
     a, asked = room(), []
-    tracker = BimccTracker(a.rig, a.tracker.model.bone, judge=Doubting(a.tracker.meter))
-    tracker.after_loss = SimpleNamespace(find=lambda frame: asked.append(frame) or [])
+    tracker = doubting_tracker(a)
+    tracker.after_loss = SimpleNamespace(find=lambda *given: asked.append(given) or [])
     picture = a.frames[2]
     state = replace(TrackState.at_rest(a.truth(picture), 0), n_lost=3)
-    given = picture.left, picture.right, picture.captured_ns
-    assert tracker.track(*given, state, GOAL)[0].verdict.reasons == (Reason.SURFACE_MISFIT,)
+    assert tracker.track(picture, state, GOAL)[0].verdict.reasons == (Reason.SURFACE_MISFIT,)
     assert len(asked) == 1
 
 
@@ -234,7 +231,7 @@ def test_in_every_lost_frame_a_dark_picture_is_the_first_reason(n_lost: int) -> 
     a, picture = room(), room().frames[2]
     state = replace(TrackState.at_rest(a.truth(picture), 0), n_lost=n_lost)
     black = np.zeros_like(picture.left)
-    tracked, _ = a.tracker.track(black, black, picture.captured_ns, state, GOAL)
+    tracked, _ = a.tracker.track(replace(picture, left=black, right=black), state, GOAL)
     assert tracked.verdict.status is Status.LOST
     assert tracked.verdict.reasons[0] is Reason.PICTURE_DARK
 
@@ -243,7 +240,9 @@ def test_in_every_lost_frame_a_dark_picture_is_the_first_reason(n_lost: int) -> 
 def test_a_glance_finds_a_bone_near_where_it_is_expected(n_lost: int) -> None:
     a = room()
     truth = a.truth(a.frames[2])
-    expected = truth.move((2.0, -1.5, 2.0, 0.01, -0.01, 0.01), truth.apply(a.tracker.centre_mm))
+    expected = truth.move(
+        (2.0, -1.5, 2.0, 0.01, -0.01, 0.01), truth.apply(a.tracker.model.centre_mm)
+    )
     found, after = glance(a, replace(TrackState.at_rest(expected, 0), n_lost=n_lost))
     assert found.verdict.status is Status.OK
     assert a.error_mm(found.left_from_bone, a.frames[2]) < 0.4
@@ -259,14 +258,20 @@ class Doubting(PoseJudge):
         return replace(tracked, verdict=Verdict(Status.DEGRADED, 0.5, (Reason.SURFACE_MISFIT,)))
 
 
+def doubting_tracker(a: Room) -> BimccTracker:
+    tracker = BimccTracker(a.rig, a.tracker.model.bone)
+    tracker.judge = Doubting(a.tracker.meter)
+    return tracker
+
+
 def test_a_doubt_at_a_glance_puts_off_no_search() -> None:
     a = room()
-    tracker = BimccTracker(a.rig, a.tracker.model.bone, judge=Doubting(a.tracker.meter))
+    tracker = doubting_tracker(a)
     state = replace(TrackState.at_rest(a.truth(a.frames[2]), 0), n_doubted=4)
     found, after = glance(a, state, tracker)
     assert found.verdict.reasons == (Reason.SURFACE_MISFIT,)
     assert after.is_search_due
-    assert not state.update(found, 0, tracker.centre_mm).is_search_due
+    assert not state.update(found, 0, tracker.model.centre_mm).is_search_due
 
 
 @pytest.mark.parametrize(("n_doubted", "is_due"), [(0, True), (2, True), (3, False), (5, False)])
@@ -274,11 +279,9 @@ def test_a_doubted_place_is_compared_with_others_ever_more_rarely(
     n_doubted: int, is_due: bool
 ) -> None:
     a, taken = room(), []
-    tracker = BimccTracker(
-        a.rig, a.tracker.model.bone, judge=Doubting(a.tracker.meter),
-        highlights=SimpleNamespace(find=lambda *given: []),
-        buried=SimpleNamespace(find=lambda frame: taken.append("buried") or []),
-    )  # fmt: skip
+    tracker = doubting_tracker(a)
+    tracker.highlights = SimpleNamespace(find=lambda *given: [])
+    tracker.buried = SimpleNamespace(find=lambda frame: taken.append("buried") or [])
     near = tracker.near.find
 
     def find(frame):
@@ -289,7 +292,7 @@ def test_a_doubted_place_is_compared_with_others_ever_more_rarely(
     tracker.near.find = find
     picture = a.frames[2]
     state = replace(TrackState.at_rest(a.truth(picture), 0), n_doubted=n_doubted)
-    tracker.track(picture.left, picture.right, picture.captured_ns, state, GOAL)
+    tracker.track(picture, state, GOAL)
     assert taken == (["near", "near", "buried"] if is_due else ["near"])
 
 
@@ -297,7 +300,7 @@ def test_the_box_of_a_pose_is_its_projection() -> None:
     a = room()
     frame = a.frames[0]
     state = TrackState.at_rest(a.truth(frame), frame.captured_ns)
-    tracked, state = a.tracker.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
+    tracked, state = a.tracker.track(frame, state, GOAL)
     mesh = a.tracker.model.bone.mesh
     pixels = a.rig.left.project(tracked.left_from_bone.apply(mesh.vertices_mm))
     box = state.box.picture_box
@@ -309,7 +312,7 @@ def test_the_time_of_a_frame_is_told_part_by_part() -> None:
     a = room()
     frame = a.frames[0]
     state = TrackState.at_rest(a.truth(frame), frame.captured_ns)
-    tracked, _ = a.tracker.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
+    tracked, _ = a.tracker.track(frame, state, GOAL)
     timings = tracked.timings
     parts = (
         timings.rectify_ms, timings.stereo_ms, timings.estimate_ms, timings.judge_ms,
@@ -326,21 +329,18 @@ class EqualAnswers:
     def __init__(self, meter) -> None:
         self.meter, self.answers = meter, []
 
-    def judge(self, frame, fit, goal, predicted=None, checks=None):
+    def judge(self, frame, fit, goal):
         verdict = Verdict(Status.DEGRADED, 1.0, (Reason.COVERAGE_LOW,), coverage=0.3)
         self.answers.append(TrackedFrame("femur", None, verdict, FrameTimings()))
         return self.answers[-1]
 
 
-@pytest.mark.parametrize(("keeps_first", "stands"), [(True, 0), (False, 1)])
-def test_of_equal_answers_the_asked_one_stands(keeps_first: bool, stands: int) -> None:
+def test_of_equal_answers_the_last_stands() -> None:
     a = room()
-    judge = EqualAnswers(a.tracker.meter)
-    tracker = BimccTracker(a.rig, a.tracker.model.bone, judge=judge)
-    best = tracker.judge_fits(
-        None, ["near", "buried"], GOAL, None, checks="begun", keeps_first=keeps_first
-    )
-    assert best is judge.answers[stands]
+    tracker = BimccTracker(a.rig, a.tracker.model.bone)
+    tracker.judge = judge = EqualAnswers(a.tracker.meter)
+    frame = tracker.begin(a.frames[0], a.truth(a.frames[0]))
+    assert tracker.judge_fits(frame, ["near", "free"], GOAL) is judge.answers[1]
 
 
 def test_candidates_that_share_a_free_measurement_are_checked_each_at_its_own_pose() -> None:
@@ -348,8 +348,9 @@ def test_candidates_that_share_a_free_measurement_are_checked_each_at_its_own_po
     a = room()
     frame, truth = a.frames[0], a.truth(a.frames[0])
     meter = Listening(a.tracker.meter, "measure_coarsely")
-    tracker = BimccTracker(a.rig, a.tracker.model.bone, judge=PoseJudge(meter))
-    view = tracker.begin(frame.left, frame.right, truth, Stopwatch())
+    tracker = BimccTracker(a.rig, a.tracker.model.bone)
+    tracker.judge = PoseJudge(meter)
+    view = tracker.begin(frame, truth)
     measured = tracker.meter.measure_freely(view.pair, view.start, WIDE_BOX)
     away = view.start.move((0.0, 0.0, 25.0, 0.2, 0.0, 0.0), view.start.translation_mm)
     fits = [
@@ -365,9 +366,10 @@ def test_a_lost_pose_places_no_box() -> None:
     a = room()
     frame = a.frames[0]
     state = TrackState.at_rest(a.truth(frame), frame.captured_ns)
-    found, before = a.tracker.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
+    found, before = a.tracker.track(frame, state, GOAL)
     lost = replace(found, verdict=replace(found.verdict, status=Status.LOST))
-    _, after = a.tracker.update(lost, before, a.frames[2].left, 66_000_000, Stopwatch())
+    later = a.tracker.begin(replace(a.frames[2], captured_ns=66_000_000), a.truth(a.frames[2]))
+    _, after = a.tracker.update(lost, before, later)
     assert after.box is before.box
-    _, after = a.tracker.update(found, before, a.frames[2].left, 66_000_000, Stopwatch())
+    _, after = a.tracker.update(found, before, later)
     assert after.box is not before.box

@@ -5,7 +5,6 @@ import numpy as np
 from navapp.tracking.contour import ContourRefiner
 from navapp.tracking.outline import OutlineMeter
 from navapp.tracking.surface_meter import NEAR_BOX, WIDE_VIEW
-from navapp.values import Stopwatch
 from tests.registration.shapes import GEOMETRY, TRUE
 from tests.tracking.rooms import blank_pair, measured_map, room
 
@@ -14,7 +13,7 @@ def test_the_outline_moves_onto_the_edges_of_both_pictures() -> None:
     """Equation (4): the mean of the squared distances, in px, becomes smaller."""
     a = room()
     frame, model, meter = a.frames[0], a.tracker.model, a.tracker.meter
-    begun = a.tracker.begin(frame.left, frame.right, a.truth(frame), Stopwatch(), WIDE_VIEW)
+    begun = a.tracker.begin(frame, a.truth(frame), WIDE_VIEW)
     measured = meter.measure_freely(begun.pair, begun.start, NEAR_BOX).disparity
     outline = OutlineMeter(model, meter.geometry)
     refiner = ContourRefiner(model, outline)

@@ -1,10 +1,12 @@
 """What is wrong for good, told by name when the bone is not found."""
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 import pytest
 
+from drivers.frames import StereoFrame
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from navapp.tracking import TrackState
@@ -43,16 +45,17 @@ def tracker_of(plan: str) -> BimccTracker:
 
 def registered(plan: str = "own", *, is_swapped: bool = False, prior: Prior | None = None):
     a = room()
-    pictures = a.frames[0].left, a.frames[0].right
-    left, right = pictures[::-1] if is_swapped else pictures
-    return tracker_of(plan).register(left, right, prior or a.prior, GOAL)
+    pictures = swap(a.frames[0]) if is_swapped else a.frames[0]
+    return tracker_of(plan).register(pictures, prior or a.prior, GOAL)
+
+
+def swap(frame: StereoFrame) -> StereoFrame:
+    return replace(frame, left=frame.right, right=frame.left)
 
 
 def tracked(state: TrackState, *, is_swapped: bool) -> tuple[TrackedFrame, TrackState]:
     frame = room().frames[0]
-    pictures = frame.left, frame.right
-    left, right = pictures[::-1] if is_swapped else pictures
-    return room().tracker.track(left, right, frame.captured_ns, state, GOAL)
+    return room().tracker.track(swap(frame) if is_swapped else frame, state, GOAL)
 
 
 def test_a_mirrored_camera_sees_the_mirrored_bone() -> None:
@@ -109,9 +112,9 @@ def test_a_lost_frame_says_that_the_pictures_are_swapped_until_they_are_not() ->
 def test_lights_out_is_not_called_swapped() -> None:
     a = room()
     frame = a.frames[0]
-    dark = np.zeros_like(frame.left)
+    dark = replace(frame, right=np.zeros_like(frame.left))
     state = TrackState.at_rest(a.truth(frame), 0)
-    found, _ = a.tracker.track(frame.left, dark, frame.captured_ns, state, GOAL)
+    found, _ = a.tracker.track(dark, state, GOAL)
     assert found.verdict.status is Status.LOST
     assert found.verdict.cause is None
 
@@ -125,9 +128,7 @@ def test_the_other_knees_plan_is_called_so_and_stays_so() -> None:
     assert all(one.verdict.reasons[0] is Reason.OTHER_SIDE for one in found)
     frame = room().frames[0]
     state = TrackState.at_rest(room().truth(frame), 0, found[0].verdict.cause)
-    after, state = tracker_of("other side").track(
-        frame.left, frame.right, frame.captured_ns, state, GOAL
-    )
+    after, state = tracker_of("other side").track(frame, state, GOAL)
     assert after.verdict.status is not Status.OK
     assert after.verdict.reasons[0] is state.cause is Reason.OTHER_SIDE
 

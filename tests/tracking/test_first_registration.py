@@ -37,7 +37,7 @@ def drawn_box(a: Room) -> tuple[int, int, int, int]:
 def test_the_first_registration_finds_the_bone_from_the_rough_prior() -> None:
     a = room()
     frame, told = a.frames[0], []
-    found = a.tracker.register(frame.left, frame.right, a.prior, GOAL, told.append)
+    found = a.tracker.register(frame, a.prior, GOAL, told.append)
     assert a.error_mm(a.prior.left_from_bone["femur"], frame) > 5.0
     assert a.error_mm(found[0].left_from_bone, frame) < 1.2
     assert found[0].verdict.status is Status.OK
@@ -56,12 +56,12 @@ def test_a_registration_can_be_stopped() -> None:
             raise StoppedError
 
     with pytest.raises(StoppedError):
-        a.tracker.register(a.frames[0].left, a.frames[0].right, a.prior, GOAL, stop)
+        a.tracker.register(a.frames[0], a.prior, GOAL, stop)
 
 
 def test_without_a_start_for_this_bone_there_is_no_candidate() -> None:
     a = room()
-    assert a.tracker.register(a.frames[0].left, a.frames[0].right, Prior(), GOAL) == []
+    assert a.tracker.register(a.frames[0], Prior(), GOAL) == []
 
 
 @pytest.mark.slow
@@ -73,7 +73,7 @@ def test_the_first_registration_finds_the_bone_without_a_pose(is_in_box: bool) -
     prior = Prior(
         {}, {"femur": ViewCone(axis, half_angle_deg)}, drawn_box(a) if is_in_box else None
     )
-    found = tracker_with_aspects().register(frame.left, frame.right, prior, GOAL, told.append)
+    found = tracker_with_aspects().register(frame, prior, GOAL, told.append)
     assert a.error_mm(found[0].left_from_bone, frame) < 1.0
     assert found[0].verdict.status is Status.OK
     assert found[0].left_from_bone.name == "left_from_femur"
@@ -87,7 +87,7 @@ def test_a_box_alone_will_do_on_grey_pictures_and_without_aspects() -> None:
     a = room(is_grey=True, n_frames=2)
     frame = a.frames[0]
     prior = Prior(box=drawn_box(a))
-    found = a.tracker.register(frame.left, frame.right, prior, GOAL)
+    found = a.tracker.register(frame, prior, GOAL)
     assert a.error_mm(found[0].left_from_bone, frame) < 1.0
 
 
@@ -97,7 +97,7 @@ def test_a_box_beside_the_bone_gives_no_ok(box: tuple[int, int, int, int]) -> No
     frame = a.frames[0]
     axis, half_angle_deg = cone()
     prior = Prior({}, {"femur": ViewCone(axis, half_angle_deg)}, box)
-    found = tracker_with_aspects().register(frame.left, frame.right, prior, GOAL)
+    found = tracker_with_aspects().register(frame, prior, GOAL)
     assert found
     assert all(one.verdict.status is not Status.OK for one in found)
 
@@ -106,5 +106,5 @@ def test_a_box_beside_the_bone_gives_no_ok(box: tuple[int, int, int, int]) -> No
 def test_where_no_start_leads_to_a_pose_a_buried_bone_is_looked_for(monkeypatch) -> None:
     monkeypatch.setattr(FitScorer, "find_poses", lambda *_: [])
     a = room()
-    (found,) = a.tracker.register(a.frames[0].left, a.frames[0].right, a.prior, GOAL)
+    (found,) = a.tracker.register(a.frames[0], a.prior, GOAL)
     assert a.error_mm(found.left_from_bone, a.frames[0]) < 1.2

@@ -180,7 +180,7 @@ def swept() -> tuple[TrackedFrame, np.ndarray, np.ndarray]:
     time_ns = camera.world_time_ns(frame.captured_ns)
     state = TrackState.at_rest(knee.world.left_from_body("femur", time_ns), frame.captured_ns)
     tracker = make_tracker(knee.rig, knee.bone)
-    tracked, _ = tracker.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
+    tracked, _ = tracker.track(frame, state, GOAL)
     box = tracked.foreground.box
     seen = knee.world.depth("left", time_ns)
     columns, rows = (one[box.slices] for one in tracker.meter.rectifier.maps[:2])
@@ -218,6 +218,6 @@ def test_only_the_tracker_that_guides_tells_it() -> None:
     for method in ("bimcc", "icp"):
         settings = TrackerSettings(method, follows_refused=True)
         tracker = make_tracker(a.rig, a.tracker.model.bone, settings)
-        tracked, _ = tracker.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
+        tracked, _ = tracker.track(frame, state, GOAL)
         assert (tracked.foreground is None) is (method == "icp")
-    assert a.tracker.assess(frame.left, frame.right, a.truth(frame), GOAL).foreground is None
+    assert a.tracker.assess(frame, a.truth(frame), GOAL).foreground is None

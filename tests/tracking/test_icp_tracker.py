@@ -13,7 +13,8 @@ from navapp.tracking.icp_tracker import IcpTracker
 from navapp.tracking.outline import OutlineMeter
 from navapp.tracking.paper_tracker import PaperTracker
 from navapp.tracking.surface_meter import NEAR_BOX, NEAR_VIEW, WIDE_BOX, WIDE_VIEW
-from navapp.values import Origin, Prior, Reason, Status, Stopwatch
+from navapp.values import Origin, Prior, Reason, Status
+from tests.pictures import Pictures
 from tests.tracking.meters import Listening
 from tests.tracking.rooms import GOAL, room
 
@@ -40,17 +41,17 @@ def test_one_fit_to_so_many_points_makes_an_answer(kind) -> None:
     """At a glance around the pose, at a first registration with more room."""
     a = room()
     frame, truth = a.frames[0], a.truth(a.frames[0])
-    start = truth.move((0.5, -0.5, 1.0, 0.01, 0.0, 0.0), truth.apply(a.tracker.centre_mm))
+    start = truth.move((0.5, -0.5, 1.0, 0.01, 0.0, 0.0), truth.apply(a.tracker.model.centre_mm))
     for margins, view in ((NEAR_BOX, NEAR_VIEW), (WIDE_BOX, WIDE_VIEW)):
         made = kind(a.rig, a.tracker.model.bone)
-        begun = made.begin(frame.left, frame.right, start, Stopwatch(), view)
+        begun = made.begin(frame, start, view)
         fit = made.find_fit(begun, margins)
         assert len(fit.measured.cloud) == (3000 if kind is IcpTracker else 6000)
         if margins is NEAR_BOX:
             state = TrackState.at_rest(start, 0)
-            tracked, _ = made.glance(frame.left, frame.right, 0, state, GOAL)
+            tracked, _ = made.glance(replace(frame, captured_ns=0), state, GOAL)
         else:
-            (tracked,) = made.register(frame.left, frame.right, Prior({"femur": start}), GOAL)
+            (tracked,) = made.register(frame, Prior({"femur": start}), GOAL)
         left_from_rectified = made.meter.geometry.rectified_from_left.inverse()
         found = left_from_rectified @ fit.pose
         np.testing.assert_array_equal(tracked.left_from_bone.matrix, found.matrix)
@@ -66,7 +67,7 @@ def test_each_chain_takes_its_own_steps() -> None:
         (PaperTracker, solve_bimcc_literal),
     ):
         made = kind(a.rig, bone)
-        begun = made.begin(frame.left, frame.right, truth, Stopwatch(), NEAR_VIEW)
+        begun = made.begin(frame, truth, NEAR_VIEW)
         fit = made.find_fit(begun, NEAR_BOX)
         solved = solve(fit.measured.scene, made.model, begun.start, 3000).estimate
         contour = ContourRefiner(made.model, OutlineMeter(made.model, made.meter.geometry))
@@ -85,11 +86,11 @@ def test_each_chain_takes_its_own_steps() -> None:
 def test_the_papers_proposal_finds_what_its_state_of_the_art_does_not() -> None:
     a = room()
     frame, truth = a.frames[0], a.truth(a.frames[0])
-    start = truth.move((1.0, -1.0, 1.0, 0.02, 0.0, 0.01), truth.apply(a.tracker.centre_mm))
+    start = truth.move((1.0, -1.0, 1.0, 0.02, 0.0, 0.01), truth.apply(a.tracker.model.centre_mm))
     errors = []
     for kind in (PaperTracker, IcpTracker):
         made = kind(a.rig, a.tracker.model.bone, TrackerSettings(follows_refused=True))
-        (found,) = made.register(frame.left, frame.right, Prior({"femur": start}), GOAL)
+        (found,) = made.register(frame, Prior({"femur": start}), GOAL)
         errors.append(a.error_mm(found.left_from_bone, frame))
         assert found.verdict.status is not Status.OK
     assert errors[0] < 2.5
@@ -102,7 +103,7 @@ def test_a_refused_pose_is_followed_when_that_is_asked_for() -> None:
     for follows in (False, True):
         made = IcpTracker(a.rig, a.tracker.model.bone, TrackerSettings("icp", follows))
         state = TrackState.at_rest(truth, frame.captured_ns - 66_000_000)
-        tracked, after = made.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
+        tracked, after = made.track(frame, state, GOAL)
         assert tracked.verdict.status is Status.LOST
         assert after.n_lost == (0 if follows else 1)
         assert (after.left_from_bone is tracked.left_from_bone) is follows
@@ -110,16 +111,16 @@ def test_a_refused_pose_is_followed_when_that_is_asked_for() -> None:
 
 def test_pictures_without_content_are_lost() -> None:
     a, icp = room(), tracker()
-    flat = np.zeros((720, 1280, 3), dtype=np.uint8)
+    flat = Pictures(*np.zeros((2, 720, 1280, 3), dtype=np.uint8), 66_000_000)
     state = TrackState.at_rest(a.truth(a.frames[0]), 0)
-    tracked, after = icp.track(flat, flat, 66_000_000, state, GOAL)
+    tracked, after = icp.track(flat, state, GOAL)
     assert tracked.verdict.status is Status.LOST
     assert tracked.verdict.reasons
     assert tracked.left_from_bone is None
     assert after.left_from_bone is state.left_from_bone
-    found = icp.register(flat, flat, a.prior, GOAL)
+    found = icp.register(flat, a.prior, GOAL)
     assert [one.verdict.status for one in found] == [Status.LOST]
-    assessed = icp.assess(flat, flat, state.left_from_bone, GOAL)
+    assessed = icp.assess(flat, state.left_from_bone, GOAL)
     assert assessed.verdict.status is Status.LOST
 
 
@@ -129,17 +130,17 @@ def test_out_of_view_it_is_lost_and_said_so(n_lost: int) -> None:
     frame = a.frames[0]
     away = a.truth(frame).move((900.0, 0, 0, 0, 0, 0), (0.0, 0.0, 0.0))
     state = replace(TrackState.at_rest(away, frame.captured_ns), n_lost=n_lost)
-    tracked, after = icp.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
+    tracked, after = icp.track(frame, state, GOAL)
     assert tracked.verdict.reasons == (Reason.OUT_OF_VIEW,)
     assert after.n_lost == n_lost + 1
-    found = icp.register(frame.left, frame.right, Prior({"femur": away}), GOAL)
+    found = icp.register(frame, Prior({"femur": away}), GOAL)
     assert [one.verdict.status for one in found] == [Status.LOST]
 
 
 def test_a_first_registration_needs_a_pose() -> None:
     frame = room().frames[0]
     prior = Prior(box=(500, 200, 300, 300))
-    assert tracker().register(frame.left, frame.right, prior, GOAL) == []
+    assert tracker().register(frame, prior, GOAL) == []
 
 
 def test_it_is_lost_where_it_was_and_looks_no_further_off() -> None:
@@ -150,7 +151,7 @@ def test_it_is_lost_where_it_was_and_looks_no_further_off() -> None:
     for n_lost in range(4):
         state = replace(TrackState.at_rest(a.truth(frame), frame.captured_ns), n_lost=n_lost)
         meter.given.clear()
-        icp.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
+        icp.track(frame, state, GOAL)
         margins = [given[1] for given in meter.given if given[1] in (NEAR_BOX, WIDE_BOX)]
         assert margins[-1] == (WIDE_BOX if n_lost else NEAR_BOX)
 
@@ -160,8 +161,9 @@ def test_it_follows_the_box() -> None:
     a, icp = room(), tracker()
     frame, moved = a.frames[0], 60
     state = TrackState.at_rest(a.truth(frame), frame.captured_ns)
-    _, state = icp.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
+    _, state = icp.track(frame, state, GOAL)
     start = state.box.picture_box
     left, right = (np.roll(eye, moved, axis=1) for eye in (frame.left, frame.right))
-    _, state = icp.track(left, right, frame.captured_ns + 66_000_000, state, GOAL)
+    shifted = Pictures(left, right, frame.captured_ns + 66_000_000)
+    _, state = icp.track(shifted, state, GOAL)
     assert state.box.picture_box.x == pytest.approx(start.x + moved, abs=6.0)

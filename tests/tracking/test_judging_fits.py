@@ -13,7 +13,7 @@ from navapp.tracking.checks import PairChecks
 from navapp.tracking.frame import FREE_SETTINGS, Fit, Frame
 from navapp.tracking.judging import PoseJudge
 from navapp.tracking.surface_meter import NEAR_BOX, NEAR_VIEW, WIDE_VIEW
-from navapp.values import Reason, Status, Stopwatch, TrackedFrame
+from navapp.values import Reason, Status, TrackedFrame
 from tests.tracking.judged import SurfaceAlone, Told, altered
 from tests.tracking.rooms import GOAL, Room, room
 
@@ -27,21 +27,22 @@ def tracked(a: Room, tracker: BimccTracker) -> TrackedFrame:
     """Of the first frame, from its truth."""
     frame = a.frames[0]
     state = TrackState.at_rest(a.truth(frame), frame.captured_ns)
-    return tracker.track(frame.left, frame.right, frame.captured_ns, state, GOAL)[0]
+    return tracker.track(frame, state, GOAL)[0]
 
 
-def found_at_the_truth(a: Room) -> tuple[Frame, PairChecks, Fit]:
+def found_at_the_truth(a: Room) -> tuple[Frame, Fit]:
     taken = a.frames[0]
-    frame = a.tracker.begin(taken.left, taken.right, a.truth(taken), Stopwatch(), NEAR_VIEW)
-    fit = next(a.tracker.near.find(frame))
-    return frame, PairChecks(a.tracker.meter, frame.pair), fit
+    frame = a.tracker.begin(taken, a.truth(taken), NEAR_VIEW)
+    frame = replace(frame, checks=PairChecks(a.tracker.meter, frame.pair))
+    return frame, next(a.tracker.near.find(frame))
 
 
 def test_the_outline_enters_the_pose_that_is_handed_out() -> None:
     a = room()
     with_it = tracked(a, a.tracker)
-    bone = a.tracker.model.bone
-    without = tracked(a, BimccTracker(a.rig, bone, judge=judge_with(SurfaceAlone())))
+    alone = BimccTracker(a.rig, a.tracker.model.bone)
+    alone.judge = judge_with(SurfaceAlone())
+    without = tracked(a, alone)
     assert np.trace(with_it.estimate.covariance) < np.trace(without.estimate.covariance)
     assert with_it.verdict.predicted_tre_mm < without.verdict.predicted_tre_mm
     error_mm = a.error_mm(with_it.left_from_bone, a.frames[0])
@@ -52,8 +53,8 @@ def test_the_covariance_turns_with_the_camera_frame() -> None:
     """Handed out in the left camera before rectification, which is a pure rotation."""
     a = room()
     frame, tracker, truth = a.frames[0], a.tracker, a.truth(a.frames[0])
-    estimate = tracker.assess(frame.left, frame.right, truth, GOAL).estimate
-    begun = tracker.begin(frame.left, frame.right, truth, Stopwatch(), WIDE_VIEW)
+    estimate = tracker.assess(frame, truth, GOAL).estimate
+    begun = tracker.begin(frame, truth, WIDE_VIEW)
     measured = tracker.meter.measure_freely(begun.pair, begun.start, NEAR_BOX)
     inside = estimate_at(measured.scene, tracker.model, begun.start, FREE_SETTINGS)
     turn = np.kron(np.eye(2), tracker.meter.geometry.rectified_from_left.rotation)
@@ -68,10 +69,9 @@ def test_a_claim_is_believed_less_and_relief_added_while_the_bone_lies_open(
     hidden_fraction: float, noise: float
 ) -> None:
     a = room()
-    frame, checks, fit = found_at_the_truth(a)
-    told = judge_with(SurfaceAlone()).judge(
-        frame, fit, GOAL, checks=altered(checks, fit, hidden_fraction=hidden_fraction)
-    )
+    frame, fit = found_at_the_truth(a)
+    checks = altered(frame.checks, fit, hidden_fraction=hidden_fraction)
+    told = judge_with(SurfaceAlone()).judge(replace(frame, checks=checks), fit, GOAL)
     relief = fit.estimate.relief_covariance
     assert relief.trace() > 0.0
     expected = noise**2 * fit.estimate.covariance + (hidden_fraction == 0.0) * relief
@@ -84,17 +84,14 @@ def test_a_claim_is_believed_less_and_relief_added_while_the_bone_lies_open(
 @pytest.mark.parametrize("hidden_fraction", [0.0, 0.9])
 def test_a_seen_size_is_in_the_bound_and_not_in_the_covariance(hidden_fraction: float) -> None:
     a = room()
-    frame, checks, fit = found_at_the_truth(a)
+    frame, fit = found_at_the_truth(a)
     step = np.array([0.2, 0.0, 0.0, 0.0, 0.0, 0.0, 0.1])
     grown = replace(fit.estimate, sized=replace(fit.estimate.sized, step=step))
     same = replace(fit.estimate, sized=replace(fit.estimate.sized, step=np.zeros(7)))
+    checks = altered(frame.checks, fit, hidden_fraction=hidden_fraction)
+    frame = replace(frame, checks=checks)
     large, small = (
-        judge_with(SurfaceAlone()).judge(
-            frame,
-            replace(fit, estimate=one),
-            GOAL,
-            checks=altered(checks, fit, hidden_fraction=hidden_fraction),
-        )
+        judge_with(SurfaceAlone()).judge(frame, replace(fit, estimate=one), GOAL)
         for one in (grown, same)
     )
     np.testing.assert_array_equal(large.estimate.covariance, small.estimate.covariance)
@@ -110,15 +107,16 @@ def test_a_fit_on_the_model_is_compared_where_it_was_matched_a_free_one_where_it
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     a = room()
-    frame, checks, fit = found_at_the_truth(a)
-    as_matched = altered(checks, fit, coverage=0.77)
+    frame, fit = found_at_the_truth(a)
+    as_matched = replace(frame, checks=altered(frame.checks, fit, coverage=0.77))
     judge = judge_with(SurfaceAlone())
-    assert judge.judge(frame, fit, GOAL, checks=as_matched).verdict.coverage == 0.77
-    check = as_matched.check(fit.measured, fit.pose).result()
+    assert judge.judge(as_matched, fit, GOAL).verdict.coverage == 0.77
+    check = as_matched.checks.check(fit.measured, fit.pose).result()
     free = replace(fit, measured=replace(fit.measured, rendered=None))
     asked = []
     monkeypatch.setattr(judging, "compare", lambda *said: asked.append(said) or compare(*said))
-    answer = judge.judge(frame, free, GOAL, checks=Told(check._replace(agreement=None)))
+    as_free = replace(frame, checks=Told(check._replace(agreement=None)))
+    answer = judge.judge(as_free, free, GOAL)
     assert asked[0][-1] is check.is_near_clipped
     disparity, geometry = fit.measured.disparity, a.tracker.meter.geometry
     view = a.tracker.model.render(fit.pose, geometry, disparity.box)
@@ -131,30 +129,30 @@ def test_a_model_that_the_outline_moved_is_compared_anew(
     moved_mm: float, is_as_matched: bool
 ) -> None:
     a = room()
-    frame, checks, fit = found_at_the_truth(a)
+    frame, fit = found_at_the_truth(a)
     outline = SurfaceAlone(shift_mm=(moved_mm, 0.0, 0.0))
-    as_matched = altered(checks, fit, coverage=0.77)
-    found = judge_with(outline).judge(frame, fit, GOAL, checks=as_matched).verdict
+    as_matched = replace(frame, checks=altered(frame.checks, fit, coverage=0.77))
+    found = judge_with(outline).judge(as_matched, fit, GOAL).verdict
     assert (found.coverage == 0.77) == is_as_matched
 
 
 def test_what_residuals_have_in_common_counts_of_a_fit_on_the_model_alone() -> None:
     """Errors of a free measurement go together anyway."""
     a = room()
-    frame, checks, fit = found_at_the_truth(a)
+    frame, fit = found_at_the_truth(a)
     rough = replace(fit.estimate, rms_mm=0.95 * fit.estimate.expected_rms_mm)
     on_model = replace(fit, estimate=rough)
     free = replace(on_model, measured=replace(fit.measured, rendered=None))
     for one, is_misfit in ((fit, False), (on_model, True), (free, False)):
-        verdict = judge_with(SurfaceAlone()).judge(frame, one, GOAL, checks=checks).verdict
+        verdict = judge_with(SurfaceAlone()).judge(frame, one, GOAL).verdict
         assert (Reason.SURFACE_MISFIT in verdict.reasons) == is_misfit
         assert verdict.status is not Status.LOST
 
 
 def test_out_of_view_there_is_nothing_to_judge() -> None:
     a = room()
-    frame, checks, _ = found_at_the_truth(a)
-    answer = judge_with(SurfaceAlone()).judge(frame, None, GOAL, checks=checks)
+    frame, _ = found_at_the_truth(a)
+    answer = judge_with(SurfaceAlone()).judge(frame, None, GOAL)
     assert answer.verdict.status is Status.LOST
     assert answer.verdict.reasons == (Reason.OUT_OF_VIEW,)
     assert answer.estimate is None

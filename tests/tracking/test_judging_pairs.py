@@ -101,7 +101,7 @@ def tracked(tracker: BimccTracker, *, dark: str = "") -> tuple[Status, tuple[Rea
     if dark:
         frame = replace(frame, **{dark: np.zeros_like(frame.left)})
     state = TrackState.at_rest(a.truth(frame), frame.captured_ns)
-    verdict = tracker.track(frame.left, frame.right, frame.captured_ns, state, GOAL)[0].verdict
+    verdict = tracker.track(frame, state, GOAL)[0].verdict
     return verdict.status, verdict.reasons
 
 
@@ -141,7 +141,9 @@ def test_a_doubt_is_searched_for_only_while_the_rows_agree() -> None:
     larger = replace(bone, mesh=replace(bone.mesh, vertices_mm=1.05 * bone.mesh.vertices_mm))
     for rig, one, n_searches in ((a.rig, larger, 1), (turned(a.rig, -1.0), bone, 0)):
         asked = Asked()
-        status, reasons = tracked(BimccTracker(rig, one, buried=asked))
+        tracker = BimccTracker(rig, one)
+        tracker.buried = asked
+        status, reasons = tracked(tracker)
         assert status is Status.DEGRADED
         assert Reason.SURFACE_MISFIT in reasons
         assert asked.n_searches == n_searches
@@ -162,10 +164,9 @@ def test_rows_that_surely_disagree_widen_the_predicted_error() -> None:
     state = TrackState.at_rest(a.truth(frame), frame.captured_ns)
     rigs = (a.rig, turned(a.rig, offset_px))
     trackers = [BimccTracker(rig, a.tracker.model.bone) for rig in rigs]
-    given = (frame.left, frame.right, frame.captured_ns, state, GOAL)
-    right, turned_by = (one.track(*given)[0].verdict for one in trackers)
+    right, turned_by = (one.track(frame, state, GOAL)[0].verdict for one in trackers)
     geometry = a.tracker.meter.geometry
-    depth_mm = float((a.truth(frame).apply(a.tracker.centre_mm))[2])
+    depth_mm = float((a.truth(frame).apply(a.tracker.model.centre_mm))[2])
     cost_mm = offset_px * depth_mm**2 / (geometry.focal_px * geometry.baseline_mm)
     expected_mm = float(np.hypot(right.predicted_tre_mm, cost_mm))
     # The rows' residuals, which go together, cost something too.

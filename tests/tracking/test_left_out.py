@@ -14,7 +14,7 @@ from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.tracking.frame import FREE_SETTINGS
 from navapp.tracking.outline import NoOutline
 from navapp.tracking.surface_meter import WIDE_BOX
-from navapp.values import Reason, Status, Stopwatch, TrackedFrame
+from navapp.values import Reason, Status, TrackedFrame
 from tests.tracking.rooms import GOAL, room
 from tests.tracking.test_judging_fits import found_at_the_truth
 
@@ -29,10 +29,10 @@ def answers_of(tracker: BimccTracker) -> list[TrackedFrame]:
     """Registered from the prior in the first frame, then followed."""
     a = room()
     first, *others = a.frames
-    found = tracker.register(first.left, first.right, a.prior, GOAL)
+    found = tracker.register(first, a.prior, GOAL)
     answers, state = [found[0]], TrackState.at_rest(found[0].left_from_bone, first.captured_ns)
     for frame in others:
-        answer, state = tracker.track(frame.left, frame.right, frame.captured_ns, state, GOAL)
+        answer, state = tracker.track(frame, state, GOAL)
         answers.append(answer)
     return answers
 
@@ -62,9 +62,9 @@ def scene_around(tracker: BimccTracker, off_mm: float) -> tuple[Scene, RigidTran
     """What is measured freely around the true pose, and a start beside it."""
     a = room()
     picture = a.frames[0]
-    frame = tracker.begin(picture.left, picture.right, a.truth(picture), Stopwatch())
+    frame = tracker.begin(picture, a.truth(picture))
     measured = tracker.meter.measure_freely(frame.pair, frame.start, WIDE_BOX)
-    centre_mm = frame.start.apply(tracker.centre_mm)
+    centre_mm = frame.start.apply(tracker.model.centre_mm)
     return measured.scene, frame.start.move((off_mm, off_mm, 0.0, 0.2, 0.0, 0.0), centre_mm)
 
 
@@ -78,9 +78,9 @@ def test_points_of_the_model_look_for_partners_only_where_they_may(parts, asks) 
 
 
 def test_all_that_is_measured_is_paired_one_way() -> None:
-    tracker, (_, _, fit) = without("backward pairs"), found_at_the_truth(room())
+    tracker, (_, fit) = without("backward pairs"), found_at_the_truth(room())
     assert fit.measured.scene.pairs_backward
-    frame, *_ = found_at_the_truth(room())
+    frame, _ = found_at_the_truth(room())
     meter = tracker.meter
     expected = meter.render(frame.pair, frame.start, WIDE_BOX)
     for measured in (
@@ -105,18 +105,18 @@ def test_a_search_of_the_whole_view_pairs_one_way_as_well(monkeypatch) -> None:
 
 def test_without_the_contour_the_pose_is_that_of_the_surface() -> None:
     a, tracker = room(), without("contour")
-    frame, checks, fit = found_at_the_truth(a)
-    told = tracker.judge.judge(frame, fit, GOAL, checks=checks)
+    frame, fit = found_at_the_truth(a)
+    told = tracker.judge.judge(frame, fit, GOAL)
     surface = tracker.meter.geometry.rectified_from_left.inverse() @ fit.pose
     np.testing.assert_array_equal(told.left_from_bone.matrix, surface.matrix)
-    joined = a.tracker.judge.judge(frame, fit, GOAL, checks=checks)
+    joined = a.tracker.judge.judge(frame, fit, GOAL)
     assert np.abs(joined.left_from_bone.matrix - surface.matrix).max() > 0.0
     assert np.trace(told.estimate.covariance) > np.trace(joined.estimate.covariance)
 
 
 def test_no_outline_is_the_same_as_one_of_which_nothing_is_found(monkeypatch) -> None:
     a = room()
-    frame, _, fit = found_at_the_truth(a)
+    frame, fit = found_at_the_truth(a)
     outline = a.tracker.judge._outline
     nothing = ResidualBlock(
         np.empty((0, 6)), np.empty(0), np.empty(0), np.empty(0), 0.3, np.empty((0, 3))
@@ -138,10 +138,10 @@ def test_no_outline_is_the_same_as_one_of_which_nothing_is_found(monkeypatch) ->
 def test_without_the_second_look_an_answer_stays_doubted(parts, n_looks) -> None:
     a, tracker, looked = room(), without(*parts), []
     tracker.highlights = SimpleNamespace(find=lambda *given: looked.append(given) or [])
-    frame, checks, fit = found_at_the_truth(a)
-    answer = tracker.judge.judge(frame, fit, GOAL, checks=checks)
+    frame, fit = found_at_the_truth(a)
+    answer = tracker.judge.judge(frame, fit, GOAL)
     doubted = _doubt(answer)
-    assert tracker.look_again(frame, doubted, GOAL, frame.start, checks) is doubted
+    assert tracker.look_again(frame, doubted, GOAL) is doubted
     assert len(looked) == n_looks
 
 
@@ -154,21 +154,21 @@ def test_without_the_judge_a_wrong_pose_is_ok_and_carried_on() -> None:
     a = room()
     picture = a.frames[0]
     truth = a.truth(picture)
-    wrong = truth.move((6.0, 0.0, 0.0, 0.0, 0.0, 0.1), truth.apply(a.tracker.centre_mm))
-    asked = a.tracker.assess(picture.left, picture.right, wrong, GOAL)
-    believed = without("judge").assess(picture.left, picture.right, wrong, GOAL)
+    wrong = truth.move((6.0, 0.0, 0.0, 0.0, 0.0, 0.1), truth.apply(a.tracker.model.centre_mm))
+    asked = a.tracker.assess(picture, wrong, GOAL)
+    believed = without("judge").assess(picture, wrong, GOAL)
     assert asked.verdict.status is not Status.OK
     assert asked.verdict.reasons
     assert (believed.verdict.status, believed.verdict.reasons) == (Status.OK, ())
     # What the judge would say of its error is still told.
     assert believed.verdict.predicted_tre_mm == asked.verdict.predicted_tre_mm
     np.testing.assert_array_equal(believed.left_from_bone.matrix, asked.left_from_bone.matrix)
-    after = TrackState.at_rest(truth, 0).update(believed, 1, a.tracker.centre_mm)
+    after = TrackState.at_rest(truth, 0).update(believed, 1, a.tracker.model.centre_mm)
     assert (after.n_lost, after.left_from_bone) == (0, believed.left_from_bone)
 
 
 def test_without_the_judge_what_is_not_found_is_still_lost() -> None:
     a, tracker = room(), without("judge")
-    frame, checks, _ = found_at_the_truth(a)
-    answer = tracker.judge.judge(frame, None, GOAL, checks=checks)
+    frame, _ = found_at_the_truth(a)
+    answer = tracker.judge.judge(frame, None, GOAL)
     assert (answer.verdict.status, answer.estimate) == (Status.LOST, None)

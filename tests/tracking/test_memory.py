@@ -4,6 +4,7 @@ import gc
 import time
 import tracemalloc
 import weakref
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ import pytest
 from navapp.geometry.bands import pool
 from navapp.tracking import TrackState, make_tracker
 from tests.bench.memory import growth_of
+from tests.pictures import Pictures
 from tests.tracking.rooms import GOAL, Room, room
 
 N_WARM, N_MORE = 12, 24
@@ -25,7 +27,7 @@ def followed(a: Room, state: TrackState, first: int, n: int) -> TrackState:
         frame = a.frames[number % len(a.frames)]
         right = np.zeros_like(frame.right) if number % 12 == 11 else frame.right
         left = frame.left.copy()  # a camera's pictures are new as well
-        _, state = a.tracker.track(left, right, number * PERIOD_NS, state, GOAL)
+        _, state = a.tracker.track(Pictures(left, right, number * PERIOD_NS), state, GOAL)
     return state
 
 
@@ -68,7 +70,7 @@ def test_a_tracker_that_nobody_needs_is_gone_at_once() -> None:
     gc.disable()
     try:
         tracker = make_tracker(a.rig, a.tracker.model.bone)
-        tracker.track(frame.left, frame.right, 0, TrackState.at_rest(a.truth(frame), 0), GOAL)
+        tracker.track(replace(frame, captured_ns=0), TrackState.at_rest(a.truth(frame), 0), GOAL)
         meter = weakref.ref(tracker.meter)
         del tracker
         assert meter() is None

@@ -6,6 +6,7 @@ import pytest
 from navapp.geometry.transform import RigidTransform
 from navapp.tracking.picked_landmarks import find_rough_poses, fit_poses, measure_picks_mm
 from navapp.values import Pick, Prior, Status
+from tests.pictures import Pictures
 from tests.registration.shapes import TRUE
 from tests.tracking.rooms import GOAL, room
 
@@ -60,7 +61,7 @@ def turn_deg(a: RigidTransform, b: RigidTransform) -> float:
 def test_picks_are_measured_where_the_bone_is() -> None:
     a = room()
     frame, picks = a.frames[0], picked(5)
-    found = measure_picks_mm(frame.left, frame.right, picks, a.tracker.meter)
+    found = measure_picks_mm(frame, picks, a.tracker.meter)
     true = a.truth(frame).apply(np.array([pick.model_mm for pick in picks]))
     # At the rim of the bone what lies behind it is matched as well.
     assert np.median(np.linalg.norm(found - true, axis=1)) < 1.5
@@ -69,9 +70,9 @@ def test_picks_are_measured_where_the_bone_is() -> None:
 def test_without_texture_nothing_is_measured_and_no_pose_made() -> None:
     a = room()
     dark = np.zeros_like(a.frames[0].left)
-    assert np.isnan(measure_picks_mm(dark, dark, picked(3), a.tracker.meter)).all()
-    assert find_rough_poses(dark, dark, picked(3), a.tracker.meter) == []
-    found = a.tracker.register(dark, dark, Prior(picks=picked(3)), GOAL)
+    assert np.isnan(measure_picks_mm(Pictures(dark, dark), picked(3), a.tracker.meter)).all()
+    assert find_rough_poses(Pictures(dark, dark), picked(3), a.tracker.meter) == []
+    found = a.tracker.register(Pictures(dark, dark), Prior(picks=picked(3)), GOAL)
     assert all(one.verdict.status is Status.LOST for one in found)
 
 
@@ -79,7 +80,7 @@ def test_without_texture_nothing_is_measured_and_no_pose_made() -> None:
 def test_three_picks_with_a_persons_error_find_the_bone() -> None:
     a = room()
     frame, picks = a.frames[0], picked(3, 6.0, 3.0)
-    best = a.tracker.register(frame.left, frame.right, Prior(picks=picks), GOAL)[0]
+    best = a.tracker.register(frame, Prior(picks=picks), GOAL)[0]
     assert best.verdict.status is Status.OK
     assert best.left_from_bone is not None
     assert a.error_mm(best.left_from_bone, frame) < 0.3

@@ -13,6 +13,7 @@ from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.tracking.row_times import RowTimes
 from navapp.tracking.surface_meter import Margins, SurfaceMeter
 from navapp.values import DisparityMap, Origin, Reason, Status
+from tests.pictures import Pictures
 from tests.tracking.rooms import GOAL, room
 
 ROW_DELAY_NS = 20_862  # 15 ms over 720 rows
@@ -33,22 +34,26 @@ def rectified():
 
 
 def depth_mm() -> float:
-    return float(rectified().apply(room().tracker.centre_mm)[2])
+    return float(rectified().apply(room().tracker.model.centre_mm)[2])
 
 
 def times(velocity=VELOCITY, skew_s: float = 0.0, row_delay_ns: int = ROW_DELAY_NS) -> RowTimes:
     """Of a bone that has moved evenly by `VELOCITY` since the frame before."""
     pose = rectified()
-    last = pose.move(-0.05 * VELOCITY, pose.apply(room().tracker.centre_mm))
+    last = pose.move(-0.05 * VELOCITY, pose.apply(room().tracker.model.centre_mm))
     known = None if velocity is None else np.asarray(velocity)
     return RowTimes(meter(row_delay_ns), known, np.zeros(6), last, 0.05, skew_s)
 
 
+def taken(captured_ns: int, skew_ns: int = 0) -> Pictures:
+    return Pictures(None, None, captured_ns, skew_ns)
+
+
 def test_without_row_delay_and_skew_nothing_is_corrected() -> None:
     state = TrackState.at_rest(room().truth(room().frames[0]), 0)
-    assert RowTimes.of_pair(meter(0), state, 66_000_000, 0) is None
-    assert RowTimes.of_pair(meter(0), state, 66_000_000, 1) is not None
-    assert RowTimes.of_pair(meter(), state, 66_000_000, 0) is not None
+    assert RowTimes.of_pair(meter(0), state, taken(66_000_000)) is None
+    assert RowTimes.of_pair(meter(0), state, taken(66_000_000, 1)) is not None
+    assert RowTimes.of_pair(meter(), state, taken(66_000_000)) is not None
 
 
 def test_a_bone_of_unknown_velocity_is_looked_up_where_it_is() -> None:
@@ -95,7 +100,7 @@ def test_a_change_of_speed_costs_depth_in_proportion_to_the_skew() -> None:
 def test_a_turn_costs_as_well() -> None:
     pose = rectified()
     turn = np.array([0.0, 0.0, 0.0, 0.0, 0.5, 0.0])
-    last = pose.move(-0.05 * turn, pose.apply(room().tracker.centre_mm))
+    last = pose.move(-0.05 * turn, pose.apply(room().tracker.model.centre_mm))
     one = RowTimes(meter(0), np.zeros(6), np.zeros(6), last, 0.05, 5e-3)
     assert one.error_mm(pose) > 0.2
     assert one.with_motion_to(pose) is not None
@@ -117,7 +122,7 @@ def test_a_first_velocity_is_taken_as_it_is() -> None:
 @pytest.mark.parametrize("elapsed_ns", [0, 500_000_000])
 def test_after_a_gap_nothing_is_known(elapsed_ns: int) -> None:
     state = replace(TrackState.at_rest(room().truth(room().frames[0]), 0), velocity=VELOCITY)
-    one = RowTimes.of_pair(meter(), state, elapsed_ns, 0)
+    one = RowTimes.of_pair(meter(), state, taken(elapsed_ns))
     assert one.velocity is None
     assert one.with_motion_to(rectified()) is None
     # 200 mm/s; both cameras see a point within 0.2 ms, and the bone's rows last 7 ms.
@@ -126,7 +131,8 @@ def test_after_a_gap_nothing_is_known(elapsed_ns: int) -> None:
 
 def test_after_a_loss_nothing_is_known() -> None:
     state = replace(TrackState.at_rest(room().truth(room().frames[0]), 0), n_lost=1)
-    assert RowTimes.of_pair(meter(), state, 66_000_000, 5_000_000).error_mm(rectified()) > 4.0
+    times_of_pair = RowTimes.of_pair(meter(), state, taken(66_000_000, 5_000_000))
+    assert times_of_pair.error_mm(rectified()) > 4.0
 
 
 def matched_rows(first: float, last: float) -> DisparityMap:
@@ -144,7 +150,9 @@ def test_the_pose_is_that_at_the_middle_of_the_rows_that_were_matched() -> None:
 
     def moved_mm(one: RowTimes, first: float, last: float) -> np.ndarray:
         pose = one.move_to_seen(rectified(), matched_rows(first, last))
-        return pose.apply(room().tracker.centre_mm) - rectified().apply(room().tracker.centre_mm)
+        return pose.apply(room().tracker.model.centre_mm) - rectified().apply(
+            room().tracker.model.centre_mm
+        )
 
     assert moved_mm(times(), 0.5, 1.0) == pytest.approx(VELOCITY[:3] * quarter_s, rel=0.05)
     assert moved_mm(times(), 0.0, 0.5) == pytest.approx(-VELOCITY[:3] * quarter_s, rel=0.05)
@@ -180,10 +188,8 @@ def test_a_carried_bone_is_measured_as_if_all_rows_had_been_exposed_at_once(
         tracker = BimccTracker(rig, bone)
         state, errors = TrackState.at_rest(known.truth[0], known.frames[0].captured_ns), []
         for frame, true in zip(known.frames, known.truth, strict=True):
-            tracked, state = tracker.track(
-                frame.left, frame.right, frame.captured_ns, state, GOAL,
-                frame.skew_ns if tells_skew else 0,
-            )  # fmt: skip
+            told = frame if tells_skew else replace(frame, skew_ns=0)
+            tracked, state = tracker.track(told, state, GOAL)
             apart = tracked.left_from_bone.apply(points) - true.apply(points)
             errors.append(float(np.linalg.norm(apart, axis=1).mean()))
         return errors[11:]
@@ -196,16 +202,13 @@ def test_a_carried_bone_is_measured_as_if_all_rows_had_been_exposed_at_once(
 
 def test_a_bone_whose_motion_is_not_known_is_refused_until_the_next_frame() -> None:
     a = room()
-    frame, later_ns = a.frames[0], 66_000_000
+    frame = replace(a.frames[0], skew_ns=4_000_000)
+    later = replace(frame, captured_ns=frame.captured_ns + 66_000_000)
     state = TrackState.at_rest(a.truth(frame), frame.captured_ns - 1_000_000_000)
-    tracked, state = a.tracker.track(
-        frame.left, frame.right, frame.captured_ns, state, GOAL, skew_ns=4_000_000
-    )
+    tracked, state = a.tracker.track(frame, state, GOAL)
     assert tracked.verdict.reasons[0] is Reason.MOTION_UNKNOWN
     assert tracked.verdict.status is Status.DEGRADED
-    tracked, _ = a.tracker.track(
-        frame.left, frame.right, frame.captured_ns + later_ns, state, GOAL, skew_ns=4_000_000
-    )
+    tracked, _ = a.tracker.track(later, state, GOAL)
     assert tracked.verdict.status is Status.OK
 
 
@@ -219,7 +222,7 @@ def test_a_bone_that_is_carried_by_another_one_is_glanced_at_with_its_motion() -
     before, now = known.frames[12], known.frames[16]
     state = TrackState.at_rest(known.truth[12], before.captured_ns)
     state = state.carry(known.truth[16] @ known.truth[12].inverse())
-    tracked, after = tracker.glance(now.left, now.right, now.captured_ns, state, GOAL, now.skew_ns)
+    tracked, after = tracker.glance(now, state, GOAL)
     points = bone.mesh.vertices_mm[bone.mesh.visible_vertices(known.truth[16])]
     apart = tracked.left_from_bone.apply(points) - known.truth[16].apply(points)
     assert np.linalg.norm(apart, axis=1).mean() < 0.2

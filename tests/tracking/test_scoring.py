@@ -9,7 +9,7 @@ from navapp.registration import ScoredPose, rank_fits, select_poses
 from navapp.tracking.frame import Fit
 from navapp.tracking.scoring import FitScorer
 from navapp.tracking.surface_meter import NEAR_BOX, WIDE_VIEW
-from navapp.values import Reason, Stopwatch
+from navapp.values import Reason
 from tests.registration.shapes import TRUE
 from tests.tracking.rooms import room
 
@@ -17,19 +17,19 @@ from tests.tracking.rooms import room
 def found_at_the_truth() -> Fit:
     a = room()
     frame, tracker = a.frames[0], a.tracker
-    begun = tracker.begin(frame.left, frame.right, a.truth(frame), Stopwatch(), WIDE_VIEW)
+    begun = tracker.begin(frame, a.truth(frame), WIDE_VIEW)
     fit = tracker.near.find_freely(begun, NEAR_BOX)
     assert fit is not None
     return fit
 
 
 def turned(fit: Fit, turn_rad: float) -> Fit:
-    pose = fit.pose.move((0, 0, 0, 0, 0, turn_rad), fit.pose.apply(room().tracker.centre_mm))
+    pose = fit.pose.move((0, 0, 0, 0, 0, turn_rad), fit.pose.apply(room().tracker.model.centre_mm))
     return replace(fit, estimate=replace(fit.estimate, camera_from_bone=pose))
 
 
 def test_a_different_pose_that_explains_as_much_makes_the_best_a_guess() -> None:
-    centre_mm, fit = room().tracker.centre_mm, found_at_the_truth()
+    centre_mm, fit = room().tracker.model.centre_mm, found_at_the_truth()
     other = turned(fit, 0.4)
     best, second = rank_fits([other, fit], [0.5, 0.52], centre_mm)
     assert best.pose is fit.pose

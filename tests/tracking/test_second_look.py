@@ -10,7 +10,7 @@ from navapp.tracking import TrackState, bimcc_tracker
 from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.tracking.first_registration import FirstRegistration
 from navapp.tracking.frame import Fit, Frame
-from navapp.values import Reason, Status, Stopwatch, TrackedFrame
+from navapp.values import Reason, Status, TrackedFrame
 from tests.many import few_rows_of
 from tests.tracking.rooms import GOAL, room
 
@@ -32,7 +32,7 @@ def found_at_the_truth() -> tuple[BimccTracker, Found, Frame, TrackedFrame]:
     picture = a.frames[0]
     tracker = BimccTracker(a.rig, a.tracker.model.bone)
     tracker.highlights = found = Found(tracker)
-    frame = tracker.begin(picture.left, picture.right, a.truth(picture), Stopwatch())
+    frame = tracker.begin(picture, a.truth(picture))
     answer = tracker.judge.judge(frame, next(iter(tracker.near.find_on_model(frame))), GOAL)
     return tracker, found, frame, answer
 
@@ -114,7 +114,7 @@ def test_after_a_second_look_the_next_frame_begins_with_it(
     monkeypatch.setattr(tracker.near, "find", lambda frame: begun.append(1) or grey(frame))
     state = TrackState.at_rest(a.truth(picture), picture.captured_ns)
     state = replace(state, is_glossy=is_glossy)
-    tracked, after = tracker.track(picture.left, picture.right, picture.captured_ns, state, GOAL)
+    tracked, after = tracker.track(picture, state, GOAL)
     assert tracked.verdict.status is Status.OK
     assert (len(begun), found.n_asked) == ((0, 1) if is_glossy else (1, 0))
     assert after.is_glossy is tracked.is_matte is is_glossy
@@ -127,7 +127,7 @@ def test_a_bone_on_which_nothing_mirrored_is_seen_is_followed_as_usual() -> None
     tracker = BimccTracker(a.rig, a.tracker.model.bone)
     state = TrackState.at_rest(a.truth(picture), picture.captured_ns)
     state = replace(state, is_glossy=True)
-    tracked, after = tracker.track(grey.left, grey.right, grey.captured_ns, state, GOAL)
+    tracked, after = tracker.track(grey, state, GOAL)
     assert tracked.verdict.status is Status.OK
     assert not after.is_glossy
 
@@ -142,7 +142,7 @@ def test_behind_a_hand_what_is_seen_without_highlights_does_not_count(
     monkeypatch.setattr(bimcc_tracker, "is_little_occluded", lambda _: False)
     state = TrackState.at_rest(a.truth(picture), picture.captured_ns)
     state = replace(state, is_glossy=True)
-    tracked, _ = tracker.track(picture.left, picture.right, picture.captured_ns, state, GOAL)
+    tracked, _ = tracker.track(picture, state, GOAL)
     assert found.n_asked == 1
     assert not tracked.is_matte
 
@@ -155,4 +155,4 @@ def test_an_ok_answer_is_replaced_by_one_that_fits_better_alone(
     monkeypatch.setattr(bimcc_tracker, "is_worth_a_second_look", lambda _: True)
     assert answer.verdict.status is Status.OK
     loose = replace(answer, verdict=replace(answer.verdict, spread_ratio=spread_ratio))
-    assert tracker.look_again(frame, loose, GOAL, frame.start).is_matte is is_replaced
+    assert tracker.look_again(frame, loose, GOAL).is_matte is is_replaced

@@ -9,6 +9,7 @@ from sim_devices.scenario import Scenario
 from sim_devices.sensor import SensorModel
 from sim_devices.world import World
 from tests.knees import femur_of
+from tests.pictures import Pictures
 
 # Of the clipped squares that are strewn over what is gone: distance, and side.
 SPACING_PX, SIDE_PX = 14, 3
@@ -36,6 +37,7 @@ def test_highlights_do_not_hide_that_a_face_was_sawn_unknown_to_the_plan() -> No
     true = world.left_from_body("femur", 0)
     tracker = make_tracker(world.rig, femur_of(world))
     goal = Goal(np.empty((0, 3)), 2.0)
-    found, _ = tracker.glance(strew(left, world, true), right, 0, TrackState.at_rest(true, 0), goal)
+    pictures = Pictures(strew(left, world, true), right)
+    found, _ = tracker.glance(pictures, TrackState.at_rest(true, 0), goal)
     assert found.verdict.status is not Status.OK
     assert Reason.SEEN_THROUGH in found.verdict.reasons

@@ -27,9 +27,12 @@ class SearchAfterLoss:
     def __init__(self, meter: SurfaceMeter, near: NearSearch, scorer: FitScorer) -> None:
         self._meter, self._near, self._scorer = meter, near, scorer
 
-    def find(self, frame: Frame) -> list[Fit | None]:
-        """Around the start; or in every other search further off. None out of view."""
-        starts = make_starts_after_loss(frame.start, self._meter.model.centre_mm, frame.n_searches)
+    def find(self, frame: Frame, n_searches: int) -> list[Fit | None]:
+        """Around the start; or in every other search further off. None out of view.
+
+        So many were made since the bone was lost, before this one.
+        """
+        starts = make_starts_after_loss(frame.start, self._meter.model.centre_mm, n_searches)
         measured = None
         if starts:
             measured = self._meter.measure_freely(frame.pair, frame.start, WIDE_VIEW)
@@ -55,13 +58,9 @@ def make_starts_after_loss(
     """
     if n_searches % 2 == 0:
         return []
-    part = n_searches // 2 % _PARTS
-    return _all_starts(last, last.apply(centre_mm))[part::_PARTS]
-
-
-def _all_starts(last: RigidTransform, place_mm: FloatArray) -> list[RigidTransform]:
-    """Tilts of the last pose where it was, and a step away along each axis."""
     starts: list[RigidTransform] = []
+    # Tilts of the last pose where it was, and a step away along each axis.
     for step_mm, tilts in _RINGS:
+        place_mm = last.apply(centre_mm)
         starts += make_scattered_starts(last, place_mm, step_mm, tilts, has_middle=not starts)
-    return starts
+    return starts[n_searches // 2 % _PARTS :: _PARTS]

@@ -40,11 +40,7 @@ _MAD_TO_SIGMA = 1.4826
 
 
 class HighlightSearch:
-    """Follows one bone onto what is measured of it without highlights.
-
-    Args:
-        meter: of the bone's surface.
-    """
+    """Follows one bone onto what is measured of it without highlights."""
 
     def __init__(self, meter: SurfaceMeter) -> None:
         self._meter = meter
@@ -56,9 +52,11 @@ class HighlightSearch:
         """
         region = self._meter.find_region(pose, NEAR_VIEW)
         expected = self._meter.render(frame.pair, pose, NEAR_BOX)
-        if frame.rectify_coloured is None or region is None or expected is None:
+        left, right, times = frame.pictures.left, frame.pictures.right, frame.times
+        if left.ndim == 2 or region is None or expected is None:
             return
-        coloured = frame.rectify_coloured(*region)
+        shifts_px = None if times is None else times.find_shifts(frame.start)
+        coloured = self._meter.rectifier.rectify(left, right, *region, row_shifts_px=shifts_px)
         matte = make_matte_pair(
             replace(coloured, box=expected.pair.box), np.isfinite(expected.support_px)
         )

@@ -149,10 +149,10 @@ def test_a_box_moves_the_pose_to_where_it_was_made(shift) -> None:
     """Depth follows the size of the box only when it changed clearly."""
     a = room()
     truth = a.truth(a.frames[0])
-    centre_mm = truth.apply(a.tracker.centre_mm)
+    centre_mm = truth.apply(a.tracker.model.centre_mm)
     elsewhere = truth.move((*shift, 0, 0, 0), centre_mm)
     found = boxes().move(truth, boxes().project(elsewhere))
-    off_mm = found.apply(a.tracker.centre_mm) - elsewhere.apply(a.tracker.centre_mm)
+    off_mm = found.apply(a.tracker.model.centre_mm) - elsewhere.apply(a.tracker.model.centre_mm)
     np.testing.assert_allclose(off_mm[:2], 0.0, atol=4.0)
     assert abs(off_mm[2]) < 20.0
     np.testing.assert_array_equal(found.rotation, truth.rotation)

@@ -62,5 +62,5 @@ def test_what_does_not_look_further_off_searches_where_it_was() -> None:
     near = SimpleNamespace(find_freely=lambda *given: given)
     meter = SimpleNamespace(model=SimpleNamespace(centre_mm=CENTRE))
     search = SearchAfterLoss(meter, near, scorer=None)
-    frame = Frame(None, LAST, Stopwatch(), n_searches=2)
-    assert list(search.find(frame)) == [(frame, WIDE_BOX)]
+    frame = Frame(None, None, LAST, Stopwatch())
+    assert list(search.find(frame, 2)) == [(frame, WIDE_BOX)]

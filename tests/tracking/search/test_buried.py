@@ -7,7 +7,7 @@ import pytest
 from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.tracking.frame import Fit, Frame
 from navapp.tracking.surface_meter import WIDE_BOX
-from navapp.values import Prior, Status, Stopwatch
+from navapp.values import Prior, Status
 from tests.tracking.rooms import GOAL, Room, room
 
 
@@ -15,8 +15,8 @@ def off(a: Room, twist: tuple[float, ...]) -> Frame:
     """The first frame, expected beside the truth."""
     taken = a.frames[0]
     true = a.truth(taken)
-    rough = true.move(twist, true.apply(a.tracker.centre_mm))
-    return a.tracker.begin(taken.left, taken.right, rough, Stopwatch())
+    rough = true.move(twist, true.apply(a.tracker.model.centre_mm))
+    return a.tracker.begin(taken, rough)
 
 
 def error_mm(a: Room, fit: Fit) -> float:
@@ -59,12 +59,12 @@ def test_the_best_answer_comes_first_and_a_sure_one_ends_the_search() -> None:
     a, asked = room(), Asked()
     frame = a.frames[0]
     tracker = BimccTracker(a.rig, a.tracker.model.bone, buried=asked)
-    answers = tracker.register(frame.left, frame.right, a.prior, GOAL)
+    answers = tracker.register(frame, a.prior, GOAL)
     assert answers[0].verdict.status is Status.OK
     assert not asked.frames
     true = a.truth(frame)
-    far_off = true.move((0.0, 60.0, 0.0, 1.5, 0.0, 0.0), true.apply(tracker.centre_mm))
-    answers = tracker.register(frame.left, frame.right, Prior({"femur": far_off}), GOAL)
+    far_off = true.move((0.0, 60.0, 0.0, 1.5, 0.0, 0.0), true.apply(tracker.model.centre_mm))
+    answers = tracker.register(frame, Prior({"femur": far_off}), GOAL)
     assert asked.frames
     orders = [one.verdict.rank for one in answers]
     assert orders == sorted(orders)

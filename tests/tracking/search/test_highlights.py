@@ -45,13 +45,13 @@ def patella() -> KnownSequence:
 def look(sequence: KnownSequence, *, is_grey: bool) -> TrackedFrame:
     """What is said of a frame that is followed from the true pose."""
     frame, true = sequence.frames[0], sequence.truth[0]
-    left, right = frame.left, frame.right
     if is_grey:
-        left, right = (np.ascontiguousarray(one[..., 1]) for one in (left, right))
+        left, right = (np.ascontiguousarray(one[..., 1]) for one in (frame.left, frame.right))
+        frame = replace(frame, left=left, right=right)
     tracker = make_tracker(sequence.rig, sequence.plan.bones["patella"])
     goal = Goal(sequence.plan.targets_of(sequence.stage.targets), sequence.stage.tolerance_mm)
     state = replace(TrackState.at_rest(true, frame.captured_ns), n_doubted=1)
-    return tracker.track(left, right, frame.captured_ns, state, goal)[0]
+    return tracker.track(frame, state, goal)[0]
 
 
 @pytest.mark.slow

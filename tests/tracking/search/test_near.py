@@ -11,7 +11,7 @@ from navapp.tracking.frame import Fit, Frame
 from navapp.tracking.scoring import FitScorer
 from navapp.tracking.search.near import LEAST_FRACTION, SURE_FRACTION, NearSearch
 from navapp.tracking.surface_meter import NEAR_BOX, WIDE_BOX, Margins
-from navapp.values import Reason, Stopwatch
+from navapp.values import Reason
 from tests.registration.shapes import TRUE
 from tests.tracking.meters import FakeMeter, Laps, Listening, error_mm, frame_at, moved
 from tests.tracking.rooms import room
@@ -191,7 +191,7 @@ def seen_knee() -> tuple[Frame, NearSearch, list[str]]:
     """A frame that starts at the truth, a search in it, and what that asks for."""
     a = room()
     frame, tracker = a.frames[0], a.tracker
-    begun = tracker.begin(frame.left, frame.right, a.truth(frame), Stopwatch())
+    begun = tracker.begin(frame, a.truth(frame))
     meter = Listening(tracker.meter)
     search = NearSearch(meter, FitScorer(tracker.meter).score)
     return begun, search, meter.asked
@@ -214,7 +214,7 @@ def test_in_pictures_a_pose_5_mm_and_5_deg_off_is_found(sign: float) -> None:
     frame, search, asked = seen_knee()
     shift, turn = np.array([3.0, -2.0, 3.5]), np.array([0.6, -0.5, 0.62])
     twist = sign * np.concatenate([shift, np.radians(5.0) * turn / np.linalg.norm(turn)])
-    off = frame.start.move(twist, frame.start.apply(room().tracker.centre_mm))
+    off = frame.start.move(twist, frame.start.apply(room().tracker.model.centre_mm))
     fit = find(search, replace(frame, start=off))
     assert asked.count("measure_freely") == 1
     assert surface_error_mm(off, frame.start) > 3.0

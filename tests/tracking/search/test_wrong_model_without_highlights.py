@@ -32,6 +32,6 @@ def test_a_model_of_another_size_stays_in_doubt(size: float, saturation: float) 
     tracker = BimccTracker(a.rig, replace(bone, mesh=scale(bone.mesh, size)))
     state = TrackState.at_rest(a.truth(frame), frame.captured_ns)
     left, right = (fade(one, saturation) for one in (frame.left, frame.right))
-    tracked, _ = tracker.track(left, right, frame.captured_ns, state, GOAL)
+    tracked, _ = tracker.track(replace(frame, left=left, right=right), state, GOAL)
     assert a.error_mm(tracked.left_from_bone, frame) > 0.5
     assert tracked.verdict.status is not Status.OK
