@@ -46,6 +46,23 @@ def where_all(
     return [where(mask, values, elsewhere) for values, elsewhere in pictures]
 
 
+def grow(mask: NDArray[np.bool_], px: int) -> NDArray[np.bool_]:
+    """A mask (h, w) with what lies so near to it, in columns and in rows."""
+    import cv2
+
+    size = 2 * px + 1
+    return np.asarray(cv2.dilate(mask.view(np.uint8), np.ones((size, size), np.uint8)) > 0)
+
+
+def shrink(mask: NDArray[np.bool_], px: int) -> NDArray[np.bool_]:
+    """A mask (h, w) without its rim so wide; beside the picture nothing is of the mask."""
+    import cv2
+
+    size = 2 * px + 1
+    square = np.ones((size, size), np.uint8)
+    return np.asarray(cv2.erode(mask.view(np.uint8), square, borderValue=0) > 0)
+
+
 def large_regions(
     mask: NDArray[np.bool_], least_px2: int, connectivity: int = 8
 ) -> NDArray[np.bool_]:

@@ -62,6 +62,18 @@ class RigidTransform:
         matrix[:3, 3] = np.asarray(translation_mm, dtype=np.float64).reshape(3)
         return cls(target, source, matrix)
 
+    @classmethod
+    def fit(
+        cls, target: str, source: str, target_mm: FloatArray, source_mm: FloatArray
+    ) -> "RigidTransform":
+        """That moves points (N, 3) of the source nearest to those of the target, in least squares.
+
+        Source: Arun 1987 (Kabsch 1976).
+        """
+        to_mm, from_mm = target_mm.mean(axis=0), source_mm.mean(axis=0)
+        rotation = nearest_rotation((target_mm - to_mm).T @ (source_mm - from_mm))
+        return cls.from_parts(target, source, rotation, to_mm - rotation @ from_mm)
+
     @property
     def name(self) -> str:
         """`target_from_source`, for messages."""

@@ -98,8 +98,7 @@ class _HiddenBoneJudge(PoseJudge):
     """
 
     def __init__(self, tracker: BimccTracker, whole: RegistrationModel, spread: FloatArray) -> None:
-        quality, keeps = tracker.meter.rectifier.rig.quality, tracker.settings.follows_refused
-        super().__init__(tracker.meter, quality, tells_refused=keeps)
+        super().__init__(tracker.meter, tracker.settings)
         self._whole, self._geometry, self._spread = whole, tracker.meter.geometry, spread
 
     def _settle(

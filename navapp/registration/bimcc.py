@@ -172,7 +172,7 @@ class _Fit:
         if sigma_mm <= settings.narrowest_mm:
             return LoopState(0, sigma_mm > 0.0, sigma_mm, 0)
         # Backward pairs are for finding the way; a near start does without the grid they need.
-        is_forward_only = sigma_mm <= _NEAR_SIGMA_MM or not self._scene.pairs_backward
+        is_forward_only = sigma_mm <= _NEAR_SIGMA_MM or not self._model.pairs_backward
         grid = NO_GRID if is_forward_only else self._scene.grid
         state: LoopState = run_coarse_loop(
             arrays, grid, model, self._pose, self._pairs, sigma_mm, settings

@@ -40,13 +40,15 @@ class RegistrationModel:
         is_usable: (V,) False for parts that are cut away.
         seen_mesh: those points and the triangles that are left: what a camera should see.
         centre_mm: (3,) mean of the bone's vertices: the covariance is about this point.
+        pairs_backward: model points look for partners in a scene, too; False: scene points alone,
+            as in plain ICP.
     """
 
     # Uncertainty of a segmented surface that carries no figure of its own; chosen.
     SURFACE_SIGMA_MM = 0.1
 
-    def __init__(self, bone: BoneModel) -> None:
-        self.bone = bone
+    def __init__(self, bone: BoneModel, *, pairs_backward: bool = True) -> None:
+        self.bone, self.pairs_backward = bone, pairs_backward
         self.seen_mesh = bone.make_seen_surface()
         self.points_mm: FloatArray = np.array(self.seen_mesh.vertices_mm)
         self.normals: FloatArray = np.array(self.seen_mesh.normals)

@@ -37,17 +37,10 @@ class Scene:
     # so many have the relief in common by which a bone differs from its model; 0: not counted.
     n_sharing_relief: float = 0.0
     thinned_to: int = 500  # the coarse loop uses about so many points
-    # model points look for partners in the scene, too; False: scene points alone, as in plain ICP.
-    pairs_backward: bool = True
 
     @classmethod
     def from_stereo(
-        cls,
-        cloud: SurfaceCloud,
-        correlation_px: float,
-        relief_px: float = 0.0,
-        *,
-        pairs_backward: bool = True,
+        cls, cloud: SurfaceCloud, correlation_px: float, relief_px: float = 0.0
     ) -> "Scene":
         """A cloud in the rectified left camera, whose errors go together over a distance.
 
@@ -57,9 +50,8 @@ class Scene:
         # The integral of exp(-r / length) over the picture.
         n_sharing_relief = 2.0 * math.pi * (relief_px / cloud.stride_px) ** 2
         return cls(
-            cloud.points_mm, np.zeros(3), cloud.sigma_ray_mm, n_sharing_errors, n_sharing_relief,
-            pairs_backward=pairs_backward,
-        )  # fmt: skip
+            cloud.points_mm, np.zeros(3), cloud.sigma_ray_mm, n_sharing_errors, n_sharing_relief
+        )
 
     def __post_init__(self) -> None:
         points = np.asarray(self.points_mm)

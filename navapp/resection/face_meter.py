@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.box import Box
+from navapp.geometry.masks import grow
 from navapp.geometry.rectification import Image, RectifiedPair, rectifier_of
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform
@@ -20,7 +21,7 @@ from navapp.resection.face_fit import (
     disparity_coefficients,
     fit_disparity_plane,
 )
-from navapp.resection.face_view import LEAST_PIXELS, FaceView, FaceViewer, grow
+from navapp.resection.face_view import LEAST_PIXELS, RIM_PX, FaceView, FaceViewer
 from navapp.resection.remaining_bone import Cut
 from navapp.stereo import match_surface, refine_on_model
 from navapp.stereo.matte_pictures import find_clipped, make_matte_pair
@@ -144,7 +145,8 @@ class FaceMeter:
         if fit is None:
             return None
         # What covers a part of the face is seen by the windows beside it as well.
-        inside = view.is_face & ~grow(_without_specks(view.is_face & ~self._is_on(found, fit)))
+        covered = _without_specks(view.is_face & ~self._is_on(found, fit))
+        inside = view.is_face & ~grow(covered, RIM_PX)
         return self._fit_pixels(found, inside, fit.coefficients, _NEAR_PX)
 
     def _choose_plane(
@@ -161,7 +163,7 @@ class FaceMeter:
         pair = self._rectifier.rectify(left, right, view.box, self._band_px(view))
         is_clipped = self._find_clipped(pair, view, fit.coefficients)
         if (is_clipped & view.is_face).any():
-            view = replace(view, is_face=view.is_face & ~grow(is_clipped))
+            view = replace(view, is_face=view.is_face & ~grow(is_clipped, RIM_PX))
             unclipped = self._fit(grey, view, fit.coefficients, is_far=False)
             if unclipped is None:
                 return None
@@ -239,7 +241,8 @@ class FaceMeter:
         self, pair: RectifiedPair, view: FaceView, coefficients: FloatArray
     ) -> DisparityMap:
         support_px = self._support_px(view.box, coefficients)
-        return refine_on_model(pair, np.where(grow(view.is_face), support_px, np.float32(np.nan)))
+        is_asked = grow(view.is_face, RIM_PX)
+        return refine_on_model(pair, np.where(is_asked, support_px, np.float32(np.nan)))
 
     def _support_px(self, box: Box, coefficients: FloatArray) -> NDArray[np.float32]:
         """(h, w) disparity of a plane over a box."""

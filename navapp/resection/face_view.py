@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.box import Box
+from navapp.geometry.masks import shrink
 from navapp.geometry.mesh import TriangleMesh, join_meshes
 from navapp.geometry.mesh_sections import fill_section, section_lines
 from navapp.geometry.rectification import RectifiedGeometry
@@ -85,7 +86,8 @@ class FaceViewer:
         alone = render_rectified(face, rectified_from_bone, self._geometry, around)
         is_kept = self._is_kept(alone.depth_mm, around, others, rectified_from_bone)
         is_seen = (both.face_index >= len(rest.faces)) & is_kept[box.relative_to(around).slices]
-        is_face, n_whole = erode(is_seen), int(np.count_nonzero(erode(alone.mask & is_kept)))
+        is_face = shrink(is_seen, RIM_PX)
+        n_whole = int(np.count_nonzero(shrink(alone.mask & is_kept, RIM_PX)))
         if np.count_nonzero(is_face) < LEAST_PIXELS:
             return None
         depths_mm = float(corners_mm[:, 2].min()), float(corners_mm[:, 2].max())
@@ -117,20 +119,3 @@ def _make_rest(bone: BoneModel, made: tuple[ResectionPlane, ...]) -> TriangleMes
     left = remove_cuts(bone, [Cut(plane, 0.0) for plane in made])
     is_left = ~left.is_removed[bone.mesh.faces].any(axis=1)
     return drawn(TriangleMesh(bone.mesh.vertices_mm, bone.mesh.faces[is_left], bone.mesh.normals))
-
-
-def erode(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """A mask (h, w) without its rim."""
-    import cv2
-
-    size = 2 * RIM_PX + 1
-    inner = cv2.erode(mask.astype(np.uint8), np.ones((size, size), np.uint8), borderValue=0)
-    return np.asarray(inner > 0)
-
-
-def grow(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """A mask (h, w) with as much around it."""
-    import cv2
-
-    size = 2 * RIM_PX + 1
-    return np.asarray(cv2.dilate(mask.astype(np.uint8), np.ones((size, size), np.uint8)) > 0)

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.rig import StereoRig
-from navapp.geometry.transform import FloatArray, RigidTransform, nearest_rotation
+from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.triangulation import triangulate_mm
 from navapp.tools.edge_kernels import locate_edges
 from navapp.tools.marker_finder import Box, MarkerFinder, SeenMarkers
@@ -104,7 +104,7 @@ class PlateMeter:
         # Markers that are mistaken for each other's lie at no depth, or have no plate's shape.
         if not (np.isfinite(seen).all() and (seen[:, 2] > _NEAREST_MM).all()):
             return None
-        pose = _align(points, seen)
+        pose = RigidTransform.fit("left", "plate", seen, points)
         if np.linalg.norm(pose.apply(points) - seen, axis=1).max() > self.plate.marker_mm:
             return None
         for _ in range(_CORNER_ROUNDS):
@@ -235,10 +235,3 @@ class _Located:
     lines: Lines
     shown: NDArray[np.intp]  # places that can be seen at this pose
     kept: NDArray[np.intp]  # of these, where an edge was found
-
-
-def _align(source_mm: FloatArray, target_mm: FloatArray) -> RigidTransform:
-    """The rigid motion from one set of points to another (Kabsch)."""
-    source, target = source_mm.mean(axis=0), target_mm.mean(axis=0)
-    turn = nearest_rotation((target_mm - target).T @ (source_mm - source))
-    return RigidTransform.from_parts("left", "plate", turn, target - turn @ source)

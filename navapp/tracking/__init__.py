@@ -3,7 +3,8 @@
 from navapp.registration.verdict import Goal
 from navapp.tracking.methods import make_tracker
 from navapp.tracking.motion import TrackState
-from navapp.tracking.tracker import Method, Part, Tracker, TrackerSettings
+from navapp.tracking.settings import Method, Part, TrackerSettings
+from navapp.tracking.tracker import Tracker
 
 __all__ = [
     "Goal",

@@ -7,7 +7,7 @@ instrument, tissue. Bone is opaque: where something further is seen, the pose is
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.geometry.masks import mark_large
+from navapp.geometry.masks import mark_large, shrink, where
 from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.zbuffer import RenderedView
 from navapp.registration.model import RegistrationModel
@@ -67,7 +67,7 @@ def compare(
     is_hidden, is_behind = np.zeros(shape, dtype=np.bool_), np.zeros(shape, dtype=np.bool_)
     n_hidden = mark_large(classes, (NEARER, COARSELY_NEARER), _LEAST_REGION_PX2, is_hidden)
     mask = view.mask
-    inner = _erase_rim(classes, mask)
+    inner = where(shrink(mask, _RIM_PX), classes, 0)
     n_behind = mark_large(inner, (FURTHER, COARSELY_FURTHER), _LEAST_REGION_PX2, is_behind)
     if is_near_clipped is not None and n_behind > 0:
         is_coarse = is_behind & (inner == COARSELY_FURTHER)
@@ -94,12 +94,3 @@ def _spread_ratio(deviation_px: NDArray[np.float32], sigma_px: NDArray[np.float3
         return 0.0
     from_middle = np.abs(deviation_px - np.median(deviation_px))
     return float(_MAD_TO_SIGMA * np.median(from_middle / sigma_px))
-
-
-def _erase_rim(classes: NDArray[np.uint8], mask: NDArray[np.bool_]) -> NDArray[np.uint8]:
-    """(h, w) classes, 0 beside a mask and on its rim."""
-    import cv2
-
-    size = 2 * _RIM_PX + 1
-    inner = cv2.erode(mask.astype(np.uint8), np.ones((size, size), np.uint8), borderValue=0)
-    return np.asarray(cv2.copyTo(classes, inner), dtype=np.uint8)

@@ -24,8 +24,9 @@ from navapp.tracking.search.buried import BuriedSearch
 from navapp.tracking.search.highlights import HighlightSearch
 from navapp.tracking.search.near import NearSearch
 from navapp.tracking.search.whole_view import WholeViewSearch
+from navapp.tracking.settings import TrackerSettings
 from navapp.tracking.surface_meter import NEAR_VIEW, SurfaceMeter
-from navapp.tracking.tracker import Tracker, TrackerSettings
+from navapp.tracking.tracker import Tracker
 from navapp.values import (
     AspectGraph,
     BoneModel,

@@ -1,7 +1,6 @@
 """Checks of a measurement that need no fitted pose: they run on the helper, beside the fit."""
 
 import threading
-import time
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple, Self
@@ -24,7 +23,7 @@ from navapp.stereo import (
 )
 from navapp.tracking.agreement import compare
 from navapp.tracking.surface_meter import Measurement, SurfaceMeter
-from navapp.values import Stopwatch, Surroundings
+from navapp.values import FrameTimings, Stopwatch, Surroundings
 
 
 class PairCheck(NamedTuple):
@@ -54,7 +53,7 @@ class PairChecks:
     ) -> None:
         self._meter, self._pair, self._coarse = meter, pair, coarse
         self._nearer = nearer
-        self._filling: Job[_Filled] | None = None
+        self._filling: Job[tuple[Surroundings | None, FrameTimings]] | None = None
         self._begun: tuple[Measurement, Job[PairCheck]] | None = None
 
     def check(self, measured: Measurement, pose: RigidTransform) -> Job[PairCheck]:
@@ -76,10 +75,10 @@ class PairChecks:
         if self._filling is None:
             return None
         is_new = not self._filling.is_fetched
-        filled = self._filling.result()
+        surroundings, timings = self._filling.result()
         if is_new:
-            watch.add_beside(filled.nearer_beside_ms, filled.fill_beside_ms)
-        return filled.surroundings
+            watch.add_beside(timings)
+        return surroundings
 
     def __enter__(self) -> Self:
         return self
@@ -100,26 +99,18 @@ class PairChecks:
             self._begun[1].drop()
 
 
-class _Filled(NamedTuple):
-    """A coarse map with its gaps filled, and what that took where it was not the asking thread."""
-
-    surroundings: Surroundings | None
-    nearer_beside_ms: float = 0.0  # of the search for what stands before the band
-    fill_beside_ms: float = 0.0
-
-
-def _fill_timed(coarse_job: Job[CoarseMap | None], nearer: NearerSearch, asking: int) -> _Filled:
-    coarse = coarse_job.result()
+def _fill_timed(
+    coarse_job: Job[CoarseMap | None], nearer: NearerSearch, asking: int
+) -> tuple[Surroundings | None, FrameTimings]:
+    """The filled map, and what it took where this is not the asking thread."""
+    coarse, watch = coarse_job.result(), Stopwatch()
     if coarse is None:
-        return _Filled(None)
-    began_ns = time.perf_counter_ns()
+        return None, watch.timings
     coarse = match_nearer(coarse, nearer)
-    matched_ns = time.perf_counter_ns()
+    watch.lap("nearer_beside")
     filled = fill_surroundings(coarse)
-    filled_ns = time.perf_counter_ns()
-    if threading.get_ident() == asking:
-        return _Filled(filled)
-    return _Filled(filled, (matched_ns - began_ns) / 1e6, (filled_ns - matched_ns) / 1e6)
+    watch.lap("fill_beside")
+    return filled, FrameTimings() if threading.get_ident() == asking else watch.timings
 
 
 # Not a method: a job that knew its checks would keep them, and a frame's pictures, alive.

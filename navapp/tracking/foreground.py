@@ -22,8 +22,6 @@ def find_foreground(
     measured: DisparityMap,
     view: RenderedView,
     geometry: RectifiedGeometry,
-    near_px: int = NEAR_PX,
-    in_front_mm: float = IN_FRONT_MM,
 ) -> Foreground:
     """A bone's surroundings, and which of them stand in front of it.
 
@@ -34,12 +32,10 @@ def find_foreground(
         measured: what it has matched replaces the surroundings.
         view: of the bone at its pose, in the same rectified view.
         geometry: of the rectified pair.
-        near_px: the nearest bone within so many pixels counts ...
-        in_front_mm: ... and what is nearer by so much.
     """
     box, is_half = surroundings.box, surroundings.is_half
     own = half_box(box) if is_half else box
-    bone_px, at = _limit_px(view, geometry, near_px, in_front_mm, is_half)
+    bone_px, at = _limit_px(view, geometry, is_half)
     here, there = own.shared_slices(at)
     limit_px = np.full((own.height, own.width), np.inf, dtype=np.float32)
     limit_px[here] = bone_px[there]
@@ -60,11 +56,7 @@ def find_foreground(
 
 
 def _limit_px(
-    view: RenderedView,
-    geometry: RectifiedGeometry,
-    near_px: int,
-    in_front_mm: float,
-    is_half: bool,
+    view: RenderedView, geometry: RectifiedGeometry, is_half: bool
 ) -> tuple[NDArray[np.float32], Box]:
     """Disparity so far in front of the nearest bone around, infinite without any, and its box."""
     import cv2
@@ -72,10 +64,10 @@ def _limit_px(
     step, box = 2 if is_half else 1, view.box
     row, column = box.y % step, box.x % step
     depth_mm = view.depth_mm[row::step, column::step]
-    limit_px = geometry.disparity_map_px(depth_mm - np.float32(in_front_mm)) / np.float32(step)
+    limit_px = geometry.disparity_map_px(depth_mm - np.float32(IN_FRONT_MM)) / np.float32(step)
     if limit_px.size == 0:
         return limit_px, Box(0, 0, 0, 0)
-    size = 2 * (near_px // step) + 1
+    size = 2 * (NEAR_PX // step) + 1
     around_px = cv2.dilate(cv2.patchNaNs(limit_px, 0.0), np.ones((size, size), np.uint8))
     limit_px = np.where(around_px > 0.0, around_px, np.float32(np.inf))
     height, width = limit_px.shape

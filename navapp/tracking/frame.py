@@ -76,13 +76,11 @@ class Fit:
         """The same fit with one more reason against its pose."""
         return replace(self, estimate=self.estimate.with_reason(reason))
 
-    def with_relief(self, noise_variance_ratio: float) -> "Fit":
-        """The fit with a covariance that counts the bone's relief as well as noise.
-
-        Divided by the ratio, because the covariances are multiplied by it later: relief is known
-        as it is, noise as it is claimed.
-        """
-        return replace(self, estimate=self.estimate.with_relief(1.0 / noise_variance_ratio))
+    def scale_noise(self, variance_ratio: float) -> "Fit":
+        """The fit on the model under another noise; any other fit as it is."""
+        if self.measured.rendered is None or not self.estimate.has_finite_covariance:
+            return self
+        return replace(self, estimate=self.estimate.scale_noise(variance_ratio))
 
     def with_correlated_residuals(self, noise_variance_ratio: float) -> "Fit":
         """The fit on the model, its covariance grown by what its residuals show beyond noise.

@@ -14,11 +14,10 @@ from navapp.registration import estimate_at, solve_icp
 from navapp.registration.best_view import find_best_view
 from navapp.registration.verdict import Goal
 from navapp.stereo import match_baseline
-from navapp.tracking.contour import ContourRefiner
 from navapp.tracking.frame import Fit, Frame, ignore
 from navapp.tracking.motion import TrackState
-from navapp.tracking.outline import OutlineMeter
 from navapp.tracking.row_times import RowTimes
+from navapp.tracking.settings import TrackerSettings
 from navapp.tracking.surface_meter import (
     NEAR_BOX,
     NEAR_VIEW,
@@ -27,7 +26,7 @@ from navapp.tracking.surface_meter import (
     Margins,
     Measurement,
 )
-from navapp.tracking.tracker import Tracker, TrackerSettings
+from navapp.tracking.tracker import Tracker
 from navapp.values import (
     AspectGraph,
     BoneModel,
@@ -61,8 +60,6 @@ class IcpTracker(Tracker):
     ) -> None:
         super().__init__(rig, bone, settings)
         self._aspects, self.n_points = aspects, n_points
-        outline = OutlineMeter(self.model, self.meter.geometry)
-        self._contour = ContourRefiner(self.model, outline)
 
     def track(
         self, pictures: StereoPictures, state: TrackState, goal: Goal
@@ -124,7 +121,7 @@ class IcpTracker(Tracker):
     def estimate(self, frame: Frame, measured: Measurement, start: RigidTransform) -> PoseEstimate:
         """The pose by ICP, refined on the contour."""
         found = solve_icp(measured.scene, self.model, start, self.n_points).estimate
-        pose = self._contour.refine(frame.pair, found.camera_from_bone, measured.disparity)
+        pose = self.judge.outline.refine(frame.pair, found.camera_from_bone, measured.disparity)
         refined = estimate_at(measured.scene, self.model, pose)
         reasons = tuple(dict.fromkeys((*found.reasons, *refined.reasons)))
         return replace(refined, iterations=found.iterations, reasons=reasons)

@@ -6,7 +6,6 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.geometry.rig import RigQuality
 from navapp.geometry.transform import FloatArray
 from navapp.geometry.zbuffer import RenderedView
 from navapp.registration.verdict import (
@@ -23,7 +22,8 @@ from navapp.tracking.checks import PairCheck, PairChecks
 from navapp.tracking.following import RestSettings
 from navapp.tracking.foreground import find_foreground
 from navapp.tracking.frame import NOISE_VARIANCE_RATIO, Fit, Frame
-from navapp.tracking.outline import NoOutline, OutlineMeter
+from navapp.tracking.outline import OutlineMeter
+from navapp.tracking.settings import TrackerSettings
 from navapp.tracking.surface_meter import SurfaceMeter
 from navapp.values import (
     Foreground,
@@ -50,25 +50,19 @@ _MOST_TARGETS = 200
 class PoseJudge:
     """Judges fits of one bone under one rig.
 
-    Without the `quality` that its calibration tells of itself, the rig is taken as it is. A pose of
-    which nothing can be said is withheld, unless the judge `tells_refused` ones. One that
-    `believes_all` calls every pose OK that was compared with the pictures, and still tells the
-    bound.
+    A rig whose calibration tells no quality is taken as it is. A pose of which nothing can be said
+    is withheld, unless refused ones are followed. Where the judge is left out every pose is OK that
+    was compared with the pictures; its bound is told all the same.
+
+    Attributes:
+        outline: of the bone.
     """
 
-    def __init__(
-        self,
-        meter: SurfaceMeter,
-        quality: RigQuality | None = None,
-        outline: OutlineMeter | NoOutline | None = None,
-        *,
-        tells_refused: bool = False,
-        believes_all: bool = False,
-    ) -> None:
-        self._tells_refused, self._believes_all = tells_refused, believes_all
-        self._meter, self._quality = meter, quality
-        self._is_rig_accepted = quality is None or quality.is_accepted
-        self._outline = outline or OutlineMeter(meter.model, meter.geometry)
+    def __init__(self, meter: SurfaceMeter, settings: TrackerSettings) -> None:
+        self._meter, self._settings = meter, settings
+        self._quality = meter.rectifier.rig.quality
+        self._is_rig_accepted = self._quality is None or self._quality.is_accepted
+        self.outline = OutlineMeter(meter.model, meter.geometry)
 
     def judge(self, frame: Frame, fit: Fit | None, goal: Goal) -> TrackedFrame:
         """The answer that a fit gives, in the left camera before rectification.
@@ -88,9 +82,10 @@ class PoseJudge:
         evidence = self._evidence_of_pair(check.health, depth_mm)
         evidence = self._evidence_of_pose(evidence, frame, fit, agreement, goal)
         verdict = decide(evidence)
-        if self._believes_all and verdict.predicted_tre_mm is not None:
+        has_bound = verdict.predicted_tre_mm is not None
+        if has_bound and "judge" in self._settings.leaves_out:
             verdict = replace(verdict, status=Status.OK, reasons=())
-        is_told = verdict.predicted_tre_mm is not None or self._tells_refused
+        is_told = has_bound or self._settings.follows_refused
         turn = self._meter.geometry.rectified_from_left.inverse()
         estimate = _at_seen_rows(frame, fit).turn_camera(turn) if is_told else None
         rows = _check_rows(check.health, evidence, verdict)
@@ -132,8 +127,14 @@ class PoseJudge:
             lies_open = agreement.lies_open
             noise_variance_ratio = NOISE_VARIANCE_RATIO if lies_open else 1.0
             if lies_open:
-                fit = fit.with_relief(noise_variance_ratio)
-            joined = self._outline.join(frame.pair, fit, check.coarse_px, noise_variance_ratio)
+                # Divided, because what follows multiplies: relief is known as it is, noise as it
+                # is claimed.
+                estimate = fit.estimate.with_relief(1.0 / noise_variance_ratio)
+                fit = replace(fit, estimate=estimate)
+            if "contour" in self._settings.leaves_out:
+                joined = fit.scale_noise(noise_variance_ratio)
+            else:
+                joined = self.outline.join(frame.pair, fit, check.coarse_px, noise_variance_ratio)
             if fit.pose.mean_motion_mm(joined.pose, model.hull_mm) > _SAME_VIEW_MM:
                 agreement = None
             fit = joined.with_correlated_residuals(noise_variance_ratio)
@@ -206,7 +207,9 @@ class PoseJudge:
         plan_mm = _COMMON_ERROR_SIGMAS * math.hypot(cartilage_sd_mm, model.bone.surface_sd_mm)
         seen_error_mm = self._bound_mm(estimate, goal.targets_mm, is_seen)
         motion_mm = 0.0 if frame.times is None else frame.times.error_mm(fit.pose)
-        bound_mm = math.hypot(seen_error_mm, plan_mm, self._error_of_rig_mm(estimate), motion_mm)
+        depth_mm = float(fit.pose.apply(model.centre_mm)[2])
+        rig_mm = 0.0 if self._quality is None else self._quality.error_mm(depth_mm)
+        bound_mm = math.hypot(seen_error_mm, plan_mm, rig_mm, motion_mm)
         size_excess_mm = math.nan
         if (sized := estimate.sized) is not None:
             # Errors of a cartilage's thickness that go together look like another size.
@@ -232,11 +235,6 @@ class PoseJudge:
             jump_deg=math.degrees(np.linalg.norm(twist[3:])),
             goal=goal,
         )
-
-    def _error_of_rig_mm(self, estimate: PoseEstimate) -> float:
-        """What the calibration itself leaves at the bone."""
-        depth_mm = float(estimate.camera_from_bone.apply(self._meter.model.centre_mm)[2])
-        return 0.0 if self._quality is None else self._quality.error_mm(depth_mm)
 
     def _bound_mm(
         self, estimate: PoseEstimate, targets_mm: FloatArray, is_seen: NDArray[np.bool_]

@@ -4,7 +4,8 @@ from navapp.geometry.rig import StereoRig
 from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.tracking.icp_tracker import IcpTracker
 from navapp.tracking.paper_tracker import PaperTracker
-from navapp.tracking.tracker import Method, Tracker, TrackerSettings
+from navapp.tracking.settings import Method, TrackerSettings
+from navapp.tracking.tracker import Tracker
 from navapp.values import AspectGraph, BoneModel
 
 _TRACKERS: dict[Method, type[BimccTracker | IcpTracker]] = {

@@ -43,6 +43,12 @@ _EDGE_SIGMA_PX = 0.15
 # Standard deviation of an offset that all edges share: the tone curve of video cameras (ITU-R
 # BT.709, computed: docs/how/registration.md) moves edges towards the dark, a linear one does not.
 _COMMON_SD_PX = 0.3
+# Of a refinement by the outline alone. It slides over the surface as the bone turns: it is found
+# anew so often; so few edges move nothing.
+_ROUNDS, _FEWEST = 2, 12
+# Length at which a turn counts as much as a shift, and the least share of the largest singular
+# value at which a direction is moved: the outline may leave some of them free.
+_ARM_MM, _LEAST_SHARE = 30.0, 0.05
 
 
 class OutlineMeter:
@@ -121,6 +127,28 @@ class OutlineMeter:
         )
         return ResidualBlock(jacobian, offset_px, variance, n_sharing, _COMMON_SD_PX, arm_mm)
 
+    def refine(
+        self, pair: RectifiedPair, pose: RigidTransform, measured: DisparityMap
+    ) -> RigidTransform:
+        """The pose whose outline lies on the edges of both pictures; unmoved without edges.
+
+        Source: equation (4): the mean of the squared distances along the normals is least.
+
+        Args:
+            pair: rectified around the bone.
+            pose: rectified left camera from bone.
+            measured: surface; an edge counts only where the bone is measured inside it.
+        """
+        model, arm = self._model, np.repeat((1.0, _ARM_MM), 3)
+        for _ in range(_ROUNDS):
+            view = model.render(pose, pair.geometry, measured.box)
+            block = self.block(pair, pose, view, measured)
+            if len(block.residual) < _FEWEST:
+                break
+            step = np.linalg.lstsq(block.jacobian / arm, block.residual, _LEAST_SHARE)[0] / arm
+            pose = pose.move(step, pose.apply(model.centre_mm))
+        return pose
+
     def _warp_to_right(self, view: RenderedView) -> tuple[NDArray[np.float32], int]:
         """The view's depth as the right camera sees it, and its first column there."""
         box = view.box
@@ -157,22 +185,6 @@ class OutlineMeter:
         n_sharing = count_near(rim.pixel, 0.5 * MODEL_CORRELATION_PX)
         jacobian = np.column_stack([slope, np.cross(arm, slope)])
         return jacobian, _EDGE_SIGMA_PX**2 + surface_px**2, n_sharing, arm
-
-
-class NoOutline:
-    """Stands for the outline where a fit is to stay what the surface alone says."""
-
-    def join(
-        self,
-        pair: RectifiedPair,
-        fit: Fit,
-        coarse_px: NDArray[np.float32] | None,
-        noise_variance_ratio: float = 1.0,
-    ) -> Fit:
-        """The fit under the surface's own noise, as `OutlineMeter.join` leaves it without one."""
-        if fit.measured.rendered is None or not fit.estimate.has_finite_covariance:
-            return fit
-        return replace(fit, estimate=fit.estimate.scale_noise(noise_variance_ratio))
 
 
 def _only(rim: Rim, kept: NDArray[np.bool_]) -> Rim:

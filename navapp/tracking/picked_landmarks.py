@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from navapp.geometry.box import Box
-from navapp.geometry.transform import FloatArray, RigidTransform, nearest_rotation
+from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.stereo import match_surface
 from navapp.tracking.surface_meter import SurfaceMeter
 from navapp.values import FEWEST_PICKS, DisparityMap, Pick, StereoPictures
@@ -76,15 +76,11 @@ def fit_poses(seen_mm: FloatArray, model_mm: FloatArray, bone: str) -> list[Rigi
 
     Several, turned about their line, when the points lie on one.
     """
-    middle_seen, middle_model = seen_mm.mean(axis=0), model_mm.mean(axis=0)
-    centred = model_mm - middle_model
-    rotation = nearest_rotation((seen_mm - middle_seen).T @ centred)
-    fitted = RigidTransform.from_parts(
-        "left", bone, rotation, middle_seen - rotation @ middle_model
-    )
-    _, sizes, axes = np.linalg.svd(centred)
-    if sizes[1] / np.sqrt(len(centred)) >= _LEAST_WIDTH_MM:
+    fitted = RigidTransform.fit("left", bone, seen_mm, model_mm)
+    _, sizes, axes = np.linalg.svd(model_mm - model_mm.mean(axis=0))
+    if sizes[1] / np.sqrt(len(model_mm)) >= _LEAST_WIDTH_MM:
         return [fitted]
-    line = rotation @ axes[0]
+    line = fitted.rotate(axes[0])
     turns_rad = 2.0 * np.pi / _N_TURNS * np.arange(_N_TURNS)
-    return [fitted.move(np.concatenate([np.zeros(3), a * line]), middle_seen) for a in turns_rad]
+    middle_mm = seen_mm.mean(axis=0)
+    return [fitted.move(np.concatenate([np.zeros(3), a * line]), middle_mm) for a in turns_rad]

@@ -159,11 +159,12 @@ class RowTimes:
         Nothing of the motion is corrected; with `is_shifted` rows are shifted for it, and only what
         that leaves counts.
         """
+        geometry = self.meter.geometry
         moved_px = line.find_flow_px(points_mm, velocity, self.skew_s)
         if is_shifted:
             of_ends_px = line.find_flow_px(line.ends_mm, velocity, self.skew_s)
-            moved_px = moved_px - line.interpolate(of_ends_px, line.rows_of(points_mm))
-        geometry = self.meter.geometry
+            rows = geometry.project(points_mm)[:, 1]
+            moved_px = moved_px - line.interpolate(of_ends_px, rows)
         depth_mm = points_mm[:, 2]
         mm_per_px = depth_mm / geometry.focal_px
         across_mm = mm_per_px[:, None] * moved_px[:, :2]
@@ -207,14 +208,6 @@ class _Line:
         share = ((rows - self.rows[0]) / np.ptp(self.rows))[:, None]
         values: FloatArray = (1.0 - share) * at_ends[0] + share * at_ends[1]
         return values
-
-    def rows_of(self, points_mm: FloatArray) -> FloatArray:
-        """(N,) rectified rows of points (N, 3)."""
-        geometry = self.meter.geometry
-        rows: FloatArray = (
-            geometry.focal_px * points_mm[:, 1] / points_mm[:, 2] + geometry.centre_y_px
-        )
-        return rows
 
     def project(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
         """(N, 2) px each of points in the left and in the right picture, as they were taken."""

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.box import Box
-from navapp.geometry.masks import large_regions
+from navapp.geometry.masks import grow, large_regions
 from navapp.geometry.rectification import Image, RectifiedPair, rectifier_of
 from navapp.geometry.reduced_rectification import ReducedRectifier
 from navapp.geometry.rig import StereoRig
@@ -37,6 +37,8 @@ from navapp.values import DisparityMap, Origin, SurfaceCloud
 FREE_CORRELATION_PX, MODEL_CORRELATION_PX = 40.0, 11.0
 _SAMPLED = replace(MODEL_REFINEMENT, n_steps=3, stops_at_rest=True, last_step_px=0.3)
 _SAMPLES_PX = 6
+# About so many measured points enter a fit.
+_N_POINTS = 2500
 # A larger gap in the answers is no highlight: something else covers the bone there. Windows that
 # reach far into it see both, and most of what covers a bone lies in front of it.
 _LARGEST_HIGHLIGHT_PX2 = 400
@@ -77,7 +79,6 @@ class Measurement:
     correlation_px: float  # distance in the picture over which its errors go together
     # the model that it was measured on; None of a free measurement.
     rendered: RenderedView | None = None
-    pairs_backward: bool = True  # as of `Scene`
     # length over which the bone's relief goes together, mm, times the focal length, px: over the
     # depth in mm it is `relief_px`; 0: relief is not counted.
     relief_mm_px: float = 0.0
@@ -97,9 +98,7 @@ class Measurement:
     @property
     def scene(self) -> Scene:
         """The cloud, to be registered to."""
-        return Scene.from_stereo(
-            self.cloud, self.correlation_px, self.relief_px, pairs_backward=self.pairs_backward
-        )
+        return Scene.from_stereo(self.cloud, self.correlation_px, self.relief_px)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,21 +117,12 @@ class SurfaceMeter:
         rig: of the pictures.
         model: of the bone.
         depth_mm: nearest and farthest surface that the rig is used for.
-        max_points: about so many enter a cloud.
-        pairs_backward: as of `Scene`, of all that is measured.
     """
 
     def __init__(
-        self,
-        rig: StereoRig,
-        model: RegistrationModel,
-        depth_mm: tuple[float, float],
-        max_points: int,
-        *,
-        pairs_backward: bool = True,
+        self, rig: StereoRig, model: RegistrationModel, depth_mm: tuple[float, float]
     ) -> None:
-        self.model, self.depth_mm, self._max_points = model, depth_mm, max_points
-        self.pairs_backward = pairs_backward
+        self.model, self.depth_mm = model, depth_mm
         self.rectifier = rectifier_of(rig)
         self.geometry = self.rectifier.geometry
         self._reduced = {n: ReducedRectifier(self.rectifier, n) for n in NearerSearch.REDUCTIONS}
@@ -199,7 +189,9 @@ class SurfaceMeter:
             return None
         box, band_px = region
         found = match_surface(replace(pair, box=box), band_px, fills=False).disparity
-        return self._measured_freely(found, partial(self._cloud, found))
+        return Measurement(
+            found, partial(self._cloud, found), found.matched_fraction, FREE_CORRELATION_PX
+        )
 
     def take_surface(self, found: DisparityMap, n_points: int) -> Measurement:
         """A free measurement from a map that was matched elsewhere: filled pixels count as well.
@@ -211,7 +203,7 @@ class SurfaceMeter:
         cloud = found.reproject(self.geometry, stride_px, tuple(Origin)[1:])
         if len(cloud) > n_points:
             cloud = cloud.select(np.linspace(0, len(cloud) - 1, n_points).astype(np.intp))
-        return self._measured_freely(found, lambda: cloud)
+        return Measurement(found, lambda: cloud, found.matched_fraction, FREE_CORRELATION_PX)
 
     def measure_coarsely(
         self, pair: RectifiedPair, pose: RigidTransform, box: Box | None = None
@@ -236,24 +228,24 @@ class SurfaceMeter:
         support_px = self.geometry.disparity_map_px(view.depth_mm)
         return Expected(replace(pair, box=region[0]), support_px, view)
 
-    def measure_on_model(self, expected: Expected) -> Measurement:
+    def measure_on_model(
+        self,
+        expected: Expected,
+        found: DisparityMap | None = None,
+        correlation_px: float = MODEL_CORRELATION_PX,
+    ) -> Measurement:
         """Sub-pixel matching on the model's own surface.
 
         Exact, but only where the surface lies within about half a pixel of the model's: elsewhere
         it answers nothing.
-        """
-        return self.take_on_model(expected, refine_on_model(expected.pair, expected.support_px))
 
-    def take_on_model(
-        self,
-        expected: Expected,
-        found: DisparityMap,
-        correlation_px: float = MODEL_CORRELATION_PX,
-    ) -> Measurement:
-        """What was matched on the model's own surface, as a measurement of it.
-
-        Its errors go together over `correlation_px`.
+        Args:
+            expected: of the model.
+            found: matched there already, otherwise.
+            correlation_px: over which its errors go together.
         """
+        if found is None:
+            found = refine_on_model(expected.pair, expected.support_px)
         is_expected = np.isfinite(expected.support_px)
         n_expected = max(int(np.count_nonzero(is_expected)), 1)
         return self._measured_on_model(
@@ -275,14 +267,6 @@ class SurfaceMeter:
         make_cloud = partial(found.reproject, self.geometry, _SAMPLES_PX)
         return self._measured_on_model(found, make_cloud, matched_fraction, expected)
 
-    def _measured_freely(
-        self, found: DisparityMap, make_cloud: Callable[[], SurfaceCloud]
-    ) -> Measurement:
-        return Measurement(
-            found, make_cloud, found.matched_fraction, FREE_CORRELATION_PX,
-            pairs_backward=self.pairs_backward,
-        )  # fmt: skip
-
     def _measured_on_model(
         self,
         found: DisparityMap,
@@ -293,25 +277,20 @@ class SurfaceMeter:
     ) -> Measurement:
         relief_mm_px = RELIEF_LENGTH_MM * self.geometry.focal_px
         return Measurement(
-            found, make_cloud, matched_fraction, correlation_px, expected.view,
-            self.pairs_backward, relief_mm_px,
-        )  # fmt: skip
+            found, make_cloud, matched_fraction, correlation_px, expected.view, relief_mm_px
+        )
 
     def _cloud(self, found: DisparityMap) -> SurfaceCloud:
-        """About `max_points` of the measured ones."""
-        stride_px = max(1, round((found.n_matched / self._max_points) ** 0.5))
+        """About `_N_POINTS` of the measured ones."""
+        stride_px = max(1, round((found.n_matched / _N_POINTS) ** 0.5))
         return found.reproject(self.geometry, stride_px)
 
 
 def remove_gap_rims(found: DisparityMap, is_expected: NDArray[np.bool_]) -> DisparityMap:
     """Without the rims of large gaps in what is expected (h, w), unless that leaves too little."""
-    import cv2
-
     is_matched = found.is_matched
     gaps = large_regions(is_expected & ~is_matched, _LARGEST_HIGHLIGHT_PX2, connectivity=4)
-    size = 2 * _MIXED_PX + 1
-    around = cv2.dilate(gaps.astype(np.uint8), np.ones((size, size), np.uint8)) > 0
-    stays = is_matched & ~around
+    stays = is_matched & ~grow(gaps, _MIXED_PX)
     if np.count_nonzero(stays) < _LEAST_UNMIXED_FRACTION * np.count_nonzero(is_matched):
         return found
     return found.only(stays)

@@ -3,8 +3,7 @@
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import replace
 
 from navapp.geometry.bands import begin_on_helper
 from navapp.geometry.rig import StereoRig
@@ -17,9 +16,9 @@ from navapp.tracking.diagnosis import Diagnosis
 from navapp.tracking.frame import FREE_SETTINGS, Fit, Frame, ignore
 from navapp.tracking.judging import PoseJudge
 from navapp.tracking.motion import TrackState
-from navapp.tracking.outline import NoOutline
 from navapp.tracking.row_times import RowTimes
 from navapp.tracking.scoring import FitScorer
+from navapp.tracking.settings import TrackerSettings
 from navapp.tracking.surface_meter import NEAR_BOX, NEAR_VIEW, WIDE_VIEW, Margins, SurfaceMeter
 from navapp.values import (
     BoneModel,
@@ -33,27 +32,8 @@ from navapp.values import (
 )
 from navapp.values.progress import Progress
 
-Method = Literal["bimcc", "paper", "icp"]
-# What can be left out of the production chain, to see what it is worth.
-Part = Literal["fill", "backward pairs", "contour", "second look", "judge"]
-
 # So often, in lost frames, it is asked whether the pictures are swapped; chosen.
 _FRAMES_BETWEEN_DIAGNOSES = 10
-
-
-@dataclass(frozen=True, slots=True)
-class TrackerSettings:
-    """How a tracker works; chosen."""
-
-    # `bimcc` is the production chain; `paper` is the paper's proposal, `icp` its state of the art.
-    method: Method = "bimcc"
-    # A pose that the judge refuses is carried on too, to be measured; it stays refused.
-    follows_refused: bool = False
-    # nearest and farthest surface that the rig is used for.
-    depth_mm: tuple[float, float] = (300.0, 700.0)
-    max_points: int = 2500  # about so many measured points enter a fit
-    # parts of `bimcc` that are not made; nothing but an evaluation asks for that.
-    leaves_out: frozenset[Part] = frozenset()
 
 
 class Tracker(ABC):
@@ -84,20 +64,12 @@ class Tracker(ABC):
         meter: SurfaceMeter | None = None,
     ) -> None:
         self.settings = settings or TrackerSettings()
-        depth_mm, max_points = self.settings.depth_mm, self.settings.max_points
-        left_out = self.settings.leaves_out
+        pairs_backward = "backward pairs" not in self.settings.leaves_out
         self.meter = meter or SurfaceMeter(
-            rig, RegistrationModel(bone), depth_mm, max_points,
-            pairs_backward="backward pairs" not in left_out,
-        )  # fmt: skip
-        self.model = self.meter.model
-        self.judge = PoseJudge(
-            self.meter,
-            rig.quality,
-            NoOutline() if "contour" in left_out else None,
-            tells_refused=self.settings.follows_refused,
-            believes_all="judge" in left_out,
+            rig, RegistrationModel(bone, pairs_backward=pairs_backward), self.settings.depth_mm
         )
+        self.model = self.meter.model
+        self.judge = PoseJudge(self.meter, self.settings)
         self.boxes = BoxTracker(rig, self.model)
         self.scorer = FitScorer(self.meter)
         self.diagnosis = Diagnosis(self.meter, self.scorer)

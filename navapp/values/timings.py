@@ -4,7 +4,7 @@ import time
 from dataclasses import asdict, dataclass
 from typing import Literal
 
-Part = Literal["rectify", "stereo", "fill", "estimate", "judge"]
+Part = Literal["rectify", "stereo", "fill", "estimate", "judge", "nearer_beside", "fill_beside"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,15 +47,14 @@ class Stopwatch:
 
     def add(self, timings: FrameTimings) -> None:
         """End a lap whose parts were timed on their own, and begin the next one."""
+        self.add_beside(timings)
+        self._lap_began_ns = time.perf_counter_ns()
+
+    def add_beside(self, timings: FrameTimings) -> None:
+        """What another thread took meanwhile; the lap goes on."""
         for name, part_ms in asdict(timings).items():
             if part_ms:
                 self._parts_ms[name] = self._parts_ms.get(name, 0.0) + part_ms
-        self._lap_began_ns = time.perf_counter_ns()
-
-    def add_beside(self, nearer_ms: float, fill_ms: float) -> None:
-        """What the helper took for a search before the band and for a fill; the lap goes on."""
-        for name, part_ms in (("nearer_beside_ms", nearer_ms), ("fill_beside_ms", fill_ms)):
-            self._parts_ms[name] = self._parts_ms.get(name, 0.0) + part_ms
 
     @property
     def timings(self) -> FrameTimings:

@@ -63,7 +63,7 @@ def measure_spreads(sequence: KnownSequence) -> dict[str, float]:
         raise AssertionError("simulated frames have a truth")
     model = RegistrationModel(sequence.plan.bones[sequence.stage.bone])
     settings = TrackerSettings()
-    meter = SurfaceMeter(sequence.rig, model, settings.depth_mm, settings.max_points)
+    meter = SurfaceMeter(sequence.rig, model, settings.depth_mm)
     pose = meter.geometry.rectified_from_left @ true
     expected = meter.render(meter.rectify(frame.left, frame.right, pose, NEAR_VIEW), pose, NEAR_BOX)
     if expected is None:

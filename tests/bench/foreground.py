@@ -20,6 +20,7 @@ import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from unittest.mock import patch
 
 import cv2
 import numpy as np
@@ -30,7 +31,7 @@ from navapp.geometry.ply import read_ply
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.rig_files import read_rig
 from navapp.geometry.transform import RigidTransform
-from navapp.tracking import Goal, TrackState, make_tracker
+from navapp.tracking import Goal, TrackState, foreground, make_tracker
 from navapp.tracking.foreground import IN_FRONT_MM, NEAR_PX, find_foreground
 from navapp.tracking.tracker import Tracker
 from navapp.values import BoneModel, Origin, Status, StereoPictures
@@ -160,7 +161,8 @@ def _judge(
     inner, seen = inner & silhouette.mask, bone & silhouette.mask
     is_guess = told.depth[1] != Origin.MATCHED
     for pair, n in counts.items():
-        found = find_foreground(surroundings, told.measured, view, geometry, *pair).is_in_front
+        with patch.multiple(foreground, NEAR_PX=pair[0], IN_FRONT_MM=pair[1]):
+            found = find_foreground(surroundings, told.measured, view, geometry).is_in_front
         asked = (found & inner, inner, found & seen, seen, found & is_guess, found)
         n += [np.count_nonzero(mask) for mask in asked]
         if pictures is not None:

@@ -20,7 +20,7 @@ from sim_devices.scenario import Scenario
 from tests.knees import SimulatedKnee
 
 FIRST_SEED = 601
-_DEPTH_MM, _MAX_POINTS = (300.0, 700.0), 2500
+_DEPTH_MM = (300.0, 700.0)
 _LARGEST_PX = 0.3
 _MAD_TO_SIGMA = 1.4826
 
@@ -39,7 +39,7 @@ def main() -> None:
 
 def _row(seed: int) -> str:
     knee = SimulatedKnee(Scenario(seed=seed, side="left" if seed % 2 else "right"))
-    meter = SurfaceMeter(knee.rig, RegistrationModel(knee.bone), _DEPTH_MM, _MAX_POINTS)
+    meter = SurfaceMeter(knee.rig, RegistrationModel(knee.bone), _DEPTH_MM)
     frame = knee.frames(1)[0]
     true = meter.geometry.rectified_from_left @ knee.truth(frame)
     pair = meter.rectify(frame.left, frame.right, true, NEAR_VIEW)

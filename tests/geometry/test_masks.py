@@ -5,7 +5,14 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from navapp.geometry.masks import large_regions, large_smooth_regions, mark_large, where
+from navapp.geometry.masks import (
+    grow,
+    large_regions,
+    large_smooth_regions,
+    mark_large,
+    shrink,
+    where,
+)
 
 pytestmark = pytest.mark.kernel
 
@@ -138,3 +145,14 @@ def test_whole_steps_of_single_precision_connect_and_larger_ones_part() -> None:
 
 def test_nothing_known_stays_nothing() -> None:
     assert not large_smooth_regions(np.full((3, 3), np.nan, dtype=np.float32), 2, 1.0).any()
+
+
+def test_a_mask_grows_and_shrinks_in_rows_and_columns_alike() -> None:
+    mask = np.zeros((9, 9), dtype=np.bool_)
+    mask[4, 4] = True
+    grown = grow(mask, 2)
+    assert grown.sum() == 25
+    assert grown[2:7, 2:7].all()
+    np.testing.assert_array_equal(shrink(grown, 2), mask)
+    # Beside the picture nothing is of the mask.
+    assert shrink(np.ones((9, 9), dtype=np.bool_), 4).sum() == 1

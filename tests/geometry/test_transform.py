@@ -244,3 +244,21 @@ def test_read_only_copies_what_could_be_written_from_outside():
     assert frozen[0] == 0.0
     assert not frozen.flags.writeable
     assert read_only(frozen) is frozen
+
+
+def test_a_fit_of_points_is_their_motion_and_the_nearest_one_where_they_are_noisy() -> None:
+    random = np.random.default_rng(7)
+    source_mm = random.normal(0.0, 30.0, (12, 3))
+    true = RigidTransform.from_parts(
+        "camera", "board", rotation_from_vector((0.3, -2.0, 0.7)), (4.0, -90.0, 350.0)
+    )
+    found = RigidTransform.fit("camera", "board", true.apply(source_mm), source_mm)
+    np.testing.assert_allclose(found.matrix, true.matrix, atol=1e-10)
+    noisy_mm = true.apply(source_mm) + random.normal(0.0, 1.0, source_mm.shape)
+    fitted = RigidTransform.fit("camera", "board", noisy_mm, source_mm)
+
+    def rms_mm(pose: RigidTransform) -> float:
+        return float(np.sqrt(((pose.apply(source_mm) - noisy_mm) ** 2).sum(axis=1).mean()))
+
+    for twist in 0.01 * np.vstack([np.eye(6), -np.eye(6)]):
+        assert rms_mm(fitted) < rms_mm(fitted.move(twist, noisy_mm.mean(axis=0)))

@@ -7,7 +7,7 @@ from navapp.geometry.box import Box
 from navapp.geometry.transform import RigidTransform
 from navapp.geometry.zbuffer import render_rectified
 from navapp.joint.occluded_tracker import OccludedTracker, Occluder
-from navapp.tracking import TrackState
+from navapp.tracking import TrackerSettings, TrackState
 from navapp.tracking.frame import NOISE_VARIANCE_RATIO
 from navapp.tracking.judging import PoseJudge
 from navapp.values import DisparityMap, Status
@@ -103,7 +103,7 @@ def test_a_bone_that_is_hidden_for_the_most_part_does_not_lie_in_the_open() -> N
         hidden = OccludedTracker(a.tracker, ball, before)
         begun = hidden.begin(frame, start)
         fit = next(hidden.near.find_on_model(begun))
-        plain = PoseJudge(hidden.meter, a.rig.quality)
+        plain = PoseJudge(hidden.meter, TrackerSettings())
         bounds[radius_mm] = [
             np.trace(judge.judge(begun, fit, GOAL).estimate.covariance)
             for judge in (plain, hidden.judge)

@@ -10,7 +10,7 @@ from navapp.geometry.transform import RigidTransform
 from navapp.registration import RegistrationModel, Scene
 from navapp.registration.verdict import Agreement
 from navapp.stereo import PictureHealth, StereoHealth
-from navapp.tracking import Goal
+from navapp.tracking import Goal, TrackerSettings
 from navapp.tracking.checks import PairCheck, PairChecks
 from navapp.tracking.frame import Fit, Frame
 from navapp.tracking.judging import PoseJudge
@@ -64,6 +64,12 @@ class SurfaceAlone:
         return replace(fit, estimate=estimate)
 
 
+def meter_of(model: RegistrationModel, quality: RigQuality | None) -> SimpleNamespace:
+    """What a judge asks of a meter."""
+    rectifier = SimpleNamespace(rig=SimpleNamespace(quality=quality))
+    return SimpleNamespace(model=model, geometry=GEOMETRY, rectifier=rectifier)
+
+
 def judged(
     estimate: PoseEstimate,
     measured: DisparityMap = MAP,
@@ -75,8 +81,8 @@ def judged(
     predicted: RigidTransform | None = None,
 ) -> TrackedFrame:
     """A pose that was fitted to a free measurement."""
-    meter = SimpleNamespace(model=model, geometry=GEOMETRY)
-    judge = PoseJudge(meter, quality, SurfaceAlone())
+    judge = PoseJudge(meter_of(model, quality), TrackerSettings())
+    judge.outline = SurfaceAlone()
     cloud = measured.reproject(GEOMETRY, 3)
     fit = Fit(estimate, Measurement(measured, lambda: cloud, 1.0, FREE_CORRELATION_PX))
     checks = Told(PairCheck(health, None, None, np.zeros(measured.origin.shape, dtype=np.bool_)))

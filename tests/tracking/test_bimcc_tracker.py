@@ -260,7 +260,7 @@ class Doubting(PoseJudge):
 
 def doubting_tracker(a: Room) -> BimccTracker:
     tracker = BimccTracker(a.rig, a.tracker.model.bone)
-    tracker.judge = Doubting(a.tracker.meter)
+    tracker.judge = Doubting(a.tracker.meter, tracker.settings)
     return tracker
 
 
@@ -349,7 +349,7 @@ def test_candidates_that_share_a_free_measurement_are_checked_each_at_its_own_po
     frame, truth = a.frames[0], a.truth(a.frames[0])
     meter = Listening(a.tracker.meter, "measure_coarsely")
     tracker = BimccTracker(a.rig, a.tracker.model.bone)
-    tracker.judge = PoseJudge(meter)
+    tracker.judge = PoseJudge(meter, tracker.settings)
     view = tracker.begin(frame, truth)
     measured = tracker.meter.measure_freely(view.pair, view.start, WIDE_BOX)
     away = view.start.move((0.0, 0.0, 25.0, 0.2, 0.0, 0.0), view.start.translation_mm)

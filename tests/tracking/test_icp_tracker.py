@@ -8,9 +8,7 @@ import pytest
 from navapp.registration import solve_bimcc_literal, solve_icp
 from navapp.tracking import TrackerSettings, TrackState, make_tracker
 from navapp.tracking.bimcc_tracker import BimccTracker
-from navapp.tracking.contour import ContourRefiner
 from navapp.tracking.icp_tracker import IcpTracker
-from navapp.tracking.outline import OutlineMeter
 from navapp.tracking.paper_tracker import PaperTracker
 from navapp.tracking.surface_meter import NEAR_BOX, NEAR_VIEW, WIDE_BOX, WIDE_VIEW
 from navapp.values import Origin, Prior, Reason, Status
@@ -29,9 +27,9 @@ def test_a_tracker_is_made_by_the_name_of_its_method() -> None:
     bone = a.tracker.model.bone
     assert type(make_tracker(a.rig, bone)) is BimccTracker
     assert type(make_tracker(a.rig, bone, TrackerSettings("bimcc"))) is BimccTracker
-    made = make_tracker(a.rig, bone, TrackerSettings("icp", max_points=900))
+    made = make_tracker(a.rig, bone, TrackerSettings("icp", follows_refused=True))
     assert type(made) is IcpTracker
-    assert made.settings.max_points == 900
+    assert made.settings.follows_refused
     assert type(make_tracker(a.rig, bone, TrackerSettings("paper"))) is PaperTracker
 
 
@@ -70,11 +68,10 @@ def test_each_chain_takes_its_own_steps() -> None:
         begun = made.begin(frame, truth, NEAR_VIEW)
         fit = made.find_fit(begun, NEAR_BOX)
         solved = solve(fit.measured.scene, made.model, begun.start, 3000).estimate
-        contour = ContourRefiner(made.model, OutlineMeter(made.model, made.meter.geometry))
         disparity = fit.measured.disparity
         expected = solved.camera_from_bone
         if kind is IcpTracker:
-            expected = contour.refine(begun.pair, expected, disparity)
+            expected = made.judge.outline.refine(begun.pair, expected, disparity)
         np.testing.assert_array_equal(fit.pose.matrix, expected.matrix)
         filled = {Origin.FILLED_BORDER, Origin.FILLED_INTERIOR, Origin.MISMATCH_FILLED}
         has_filled = bool(filled & set(np.unique(fit.measured.cloud.origin)))

@@ -1,7 +1,6 @@
 """What is said of poses of which the truth is known."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,7 +8,7 @@ import pytest
 from navapp.geometry.rig import RigQuality
 from navapp.registration import RegistrationModel, estimate_at, fit_bimcc
 from navapp.registration.verdict import OK_ERROR_MM
-from navapp.tracking import Goal
+from navapp.tracking import Goal, TrackerSettings
 from navapp.tracking.agreement import compare
 from navapp.tracking.frame import FREE_SETTINGS
 from navapp.tracking.judging import PoseJudge
@@ -26,7 +25,7 @@ from navapp.values import (
 )
 from sim_devices.anatomy import KneeSpec, make_knee
 from tests.registration.shapes import GEOMETRY, TRUE, disturbed
-from tests.tracking.judged import BONE, MAP, MODEL, NO_TARGETS, SurfaceAlone, judged, scene_of
+from tests.tracking.judged import BONE, MAP, MODEL, NO_TARGETS, judged, meter_of, scene_of
 from tests.tracking.rooms import measured_map
 
 
@@ -130,11 +129,8 @@ def test_a_rig_that_was_not_accepted_is_told_of_lost_poses_too() -> None:
     loose = replace(estimate_on(), covariance=np.full((6, 6), np.inf))
     told = judged(loose, quality=RigQuality(False, ("too few pictures",))).verdict
     assert told.reasons == (Reason.DEGENERATE, Reason.RIG_NOT_ACCEPTED)
-    judge = PoseJudge(
-        SimpleNamespace(model=MODEL, geometry=GEOMETRY),
-        RigQuality(False, ("too few pictures",)),
-        SurfaceAlone(),
-    )
+    meter = meter_of(MODEL, RigQuality(False, ("too few pictures",)))
+    judge = PoseJudge(meter, TrackerSettings())
     nothing = judge.lost(Reason.OUT_OF_VIEW, Stopwatch()).verdict
     assert nothing.reasons == (Reason.OUT_OF_VIEW, Reason.RIG_NOT_ACCEPTED)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from navapp.registration import estimate_at
-from navapp.tracking import TrackState, judging
+from navapp.tracking import TrackerSettings, TrackState, judging
 from navapp.tracking.agreement import compare
 from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.tracking.checks import PairChecks
@@ -20,7 +20,9 @@ from tests.tracking.rooms import GOAL, Room, room
 
 def judge_with(outline: SurfaceAlone) -> PoseJudge:
     a = room()
-    return PoseJudge(a.tracker.meter, a.rig.quality, outline)
+    judge = PoseJudge(a.tracker.meter, TrackerSettings())
+    judge.outline = outline
+    return judge
 
 
 def tracked(a: Room, tracker: BimccTracker) -> TrackedFrame:

@@ -12,7 +12,6 @@ from navapp.registration.residual_blocks import ResidualBlock
 from navapp.tracking import Part, TrackerSettings, TrackState
 from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.tracking.frame import FREE_SETTINGS
-from navapp.tracking.outline import NoOutline
 from navapp.tracking.surface_meter import WIDE_BOX
 from navapp.values import Reason, Status, TrackedFrame
 from tests.tracking.rooms import GOAL, room
@@ -77,32 +76,6 @@ def test_points_of_the_model_look_for_partners_only_where_they_may(parts, asks) 
     assert ("grid" in vars(scene)) == asks
 
 
-def test_all_that_is_measured_is_paired_one_way() -> None:
-    tracker, (_, fit) = without("backward pairs"), found_at_the_truth(room())
-    assert fit.measured.scene.pairs_backward
-    frame, _ = found_at_the_truth(room())
-    meter = tracker.meter
-    expected = meter.render(frame.pair, frame.start, WIDE_BOX)
-    for measured in (
-        meter.measure_on_model(expected),
-        meter.measure_on_samples(expected),
-        meter.measure_freely(frame.pair, frame.start, WIDE_BOX),
-        meter.take_surface(fit.measured.disparity, 500),
-    ):
-        assert not measured.scene.pairs_backward
-
-
-def test_a_search_of_the_whole_view_pairs_one_way_as_well(monkeypatch) -> None:
-    a, given = room(), []
-    path = "navapp.tracking.search.whole_view.find_initial"
-    monkeypatch.setattr(path, lambda pair, scene, *_, **__: given.append(scene) or [])
-    for tracker in (without(), without("backward pairs")):
-        search = tracker.whole_view
-        search.find_poses(search.rectify(a.frames[0].left, a.frames[0].right, a.prior), a.prior,
-                          lambda _: None)  # fmt: skip
-    assert [scene.pairs_backward for scene in given] == [True, False]
-
-
 def test_without_the_contour_the_pose_is_that_of_the_surface() -> None:
     a, tracker = room(), without("contour")
     frame, fit = found_at_the_truth(a)
@@ -114,17 +87,17 @@ def test_without_the_contour_the_pose_is_that_of_the_surface() -> None:
     assert np.trace(told.estimate.covariance) > np.trace(joined.estimate.covariance)
 
 
-def test_no_outline_is_the_same_as_one_of_which_nothing_is_found(monkeypatch) -> None:
+def test_without_an_outline_a_fit_is_as_with_one_of_which_nothing_is_found(monkeypatch) -> None:
     a = room()
     frame, fit = found_at_the_truth(a)
-    outline = a.tracker.judge._outline
+    outline = a.tracker.judge.outline
     nothing = ResidualBlock(
         np.empty((0, 6)), np.empty(0), np.empty(0), np.empty(0), 0.3, np.empty((0, 3))
     )
     monkeypatch.setattr(outline, "block", lambda *_: nothing)
     for noise in (1.0, 0.4):
         expected = outline.join(frame.pair, fit, None, noise).estimate
-        found = NoOutline().join(frame.pair, fit, None, noise).estimate
+        found = fit.scale_noise(noise).estimate
         np.testing.assert_array_equal(found.covariance, expected.covariance)
         np.testing.assert_array_equal(found.sized.covariance, expected.sized.covariance)
         np.testing.assert_array_equal(found.sized.step, expected.sized.step)

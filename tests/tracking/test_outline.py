@@ -13,9 +13,10 @@ from navapp.geometry.transform import RigidTransform
 from navapp.geometry.zbuffer import render_rectified
 from navapp.tracking.frame import Fit
 from navapp.tracking.outline import OutlineMeter
-from navapp.tracking.surface_meter import Measurement
+from navapp.tracking.surface_meter import NEAR_BOX, WIDE_VIEW, Measurement
 from navapp.values import DisparityMap, Origin, PoseEstimate, Reason, SurfaceCloud
 from tests.registration.shapes import GEOMETRY, TRUE, femur, femur_for_registration
+from tests.tracking.rooms import blank_pair, measured_map, room
 from tests.views import project_box
 
 FINE = 4
@@ -161,3 +162,27 @@ def test_each_picture_tells_something_of_its_own(eye: int) -> None:
     found = meter().block(one, TRUE, fit.measured.rendered, fit.measured.disparity)
     both = block_at(fit)
     assert 0.3 * len(both.residual) < len(found.residual) < 0.7 * len(both.residual)
+
+
+def test_the_outline_moves_onto_the_edges_of_both_pictures() -> None:
+    """Equation (4): the mean of the squared distances, in px, becomes smaller."""
+    a = room()
+    frame, model, meter = a.frames[0], a.tracker.model, a.tracker.meter
+    begun = a.tracker.begin(frame, a.truth(frame), WIDE_VIEW)
+    measured = meter.measure_freely(begun.pair, begun.start, NEAR_BOX).disparity
+    outline = OutlineMeter(model, meter.geometry)
+
+    def mean_square_px2(pose) -> float:
+        view = model.render(pose, meter.geometry, measured.box)
+        return float(np.mean(outline.block(begun.pair, pose, view, measured).residual ** 2))
+
+    for shift_mm in ((0.4, 0.0, 0.0), (0.0, 0.4, 0.0), (-0.3, 0.3, 0.0)):
+        start = begun.start.move((*shift_mm, 0.0, 0.0, 0.0), np.zeros(3))
+        found = outline.refine(begun.pair, start, measured)
+        assert mean_square_px2(found) < 0.5 * mean_square_px2(start)
+
+
+def test_without_edges_a_pose_stays() -> None:
+    model = room().tracker.model
+    outline = OutlineMeter(model, GEOMETRY)
+    assert outline.refine(blank_pair(), TRUE, measured_map(model.bone)) is TRUE

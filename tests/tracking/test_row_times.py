@@ -25,7 +25,7 @@ ALONG_X = np.eye(6)[0]
 def meter(row_delay_ns: int = ROW_DELAY_NS) -> SurfaceMeter:
     a = room()
     rig: StereoRig = replace(a.rig, row_delay_ns=row_delay_ns)
-    return SurfaceMeter(rig, RegistrationModel(a.tracker.model.bone), (300.0, 700.0), 2500)
+    return SurfaceMeter(rig, RegistrationModel(a.tracker.model.bone), (300.0, 700.0))
 
 
 def rectified():

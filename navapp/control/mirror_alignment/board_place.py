@@ -10,7 +10,7 @@ from calibration.rig.corner_locator import locate_marks
 from calibration.targets.boards import Board
 from navapp.control.capture.board_view import BoardView
 from navapp.geometry.rig import StereoRig
-from navapp.geometry.transform import FloatArray, RigidTransform, nearest_rotation
+from navapp.geometry.transform import FloatArray, RigidTransform
 
 # A place is told by as many corners.
 _FEWEST_CORNERS = 6
@@ -68,7 +68,7 @@ def locate_board(view: BoardView, board: Board, rig: StereoRig) -> BoardPlace | 
         pair.left.sigma_px[np.isin(pair.left.ids, ids)],
         pair.right.sigma_px[np.isin(pair.right.ids, ids)],
     )
-    pose = _fit_pose(board.points_mm[ids], points)
+    pose = RigidTransform.fit("left", "board", points, board.points_mm[ids])
     time_ns = view.frame.captured_ns
     return BoardPlace(time_ns, ids, points, _sds_mm(rig, points[:, 2], sigma_px), pose)
 
@@ -80,13 +80,6 @@ def _sds_mm(rig: StereoRig, depths_mm: FloatArray, sigma_px: FloatArray) -> Floa
     ahead = depths_mm**2 / (rig.left.focal_px * baseline_mm) * sigma_px
     told: FloatArray = np.sqrt((2.0 * aside**2 + ahead**2) / 3.0 + _LEAST_SD_MM**2)
     return told
-
-
-def _fit_pose(board_mm: FloatArray, left_mm: FloatArray) -> RigidTransform:
-    """Left camera from board, in least squares (Kabsch)."""
-    from_mm, to_mm = board_mm.mean(axis=0), left_mm.mean(axis=0)
-    rotation = nearest_rotation((left_mm - to_mm).T @ (board_mm - from_mm))
-    return RigidTransform.from_parts("left", "board", rotation, to_mm - rotation @ from_mm)
 
 
 class BoardLooks:

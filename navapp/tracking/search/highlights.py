@@ -90,7 +90,9 @@ class HighlightSearch:
         without = without.only(~is_filled[box.slices])
         if not are_highlights_seen(found, without):
             return None
-        return self._meter.take_on_model(expected, join_maps(found, without), FREE_CORRELATION_PX)
+        return self._meter.measure_on_model(
+            expected, join_maps(found, without), FREE_CORRELATION_PX
+        )
 
 
 def are_highlights_seen(grey: DisparityMap, matte: DisparityMap) -> bool:

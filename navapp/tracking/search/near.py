@@ -35,10 +35,10 @@ class NearSearch:
         Matching on the model is exact but sees only what is close. Unless samples of it led to
         where much of it is matched, the surface is measured freely as well. None: out of view.
         """
-        sampled = self._rest_from_samples(frame)
+        sampled = self._rest(frame)
         if sampled is not None:
             yield sampled
-        whole = self._rest_at_once(frame)
+        whole = self._rest(frame, skips_samples=True)
         if whole is not None:
             yield whole
         if sampled is not None and sampled.measured.matched_fraction >= SURE_FRACTION:
@@ -50,17 +50,15 @@ class NearSearch:
 
     def find_on_model(self, frame: Frame) -> Iterator[Fit]:
         """Fits on the model alone: from samples of it first, then from all of it at once."""
-        for rest in (self._rest_from_samples, self._rest_at_once):
-            if (fit := rest(frame)) is not None:
+        for skips_samples in (False, True):
+            if (fit := self._rest(frame, skips_samples=skips_samples)) is not None:
                 yield fit
 
-    def _rest_from_samples(self, frame: Frame) -> Fit | None:
-        told = frame.on_measured
-        return self._follower.follow(frame, frame.start, LEAST_FRACTION, on_measured=told)
-
-    def _rest_at_once(self, frame: Frame) -> Fit | None:
-        told = frame.on_measured
-        return self._follower.follow(frame, frame.start, skips_samples=True, on_measured=told)
+    def _rest(self, frame: Frame, *, skips_samples: bool = False) -> Fit | None:
+        return self._follower.follow(
+            frame, frame.start, LEAST_FRACTION, skips_samples=skips_samples,
+            on_measured=frame.on_measured,
+        )  # fmt: skip
 
     def find_freely(self, frame: Frame, margins: Margins) -> Fit | None:
         """Measure freely around the start, fit, then follow onto the model; None out of view."""

@@ -46,9 +46,7 @@ class WholeViewSearch:
         found = match_surface(pair, self._meter.band_px, fills=False).disparity
         stride_px = max(1, int(np.ceil((found.n_matched / _MOST_POINTS) ** 0.5)))
         cloud = found.reproject(geometry, stride_px)
-        scene = Scene.from_stereo(
-            cloud, FREE_CORRELATION_PX, pairs_backward=self._meter.pairs_backward
-        )
+        scene = Scene.from_stereo(cloud, FREE_CORRELATION_PX)
         cone = prior.cones.get(model.bone.name, ViewCone())
         return find_initial(pair, scene, model, cone, self._aspects, on_progress=on_progress)
 
