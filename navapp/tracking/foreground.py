@@ -13,8 +13,6 @@ from navapp.values import DisparityMap, Foreground, Surroundings
 # Nearer than the nearest bone within so many pixels, by so much: chosen on simulated knees
 # (`python -m tests.bench.foreground`). A matching window hangs over the bone's rim by about as far.
 NEAR_PX, IN_FRONT_MM = 4, 5.0
-# Guesses follow what is matched beside them, then those that a vote has marked.
-_N_VOTES = 2
 
 
 def find_foreground(
@@ -40,11 +38,8 @@ def find_foreground(
     limit_px = np.full((own.height, own.width), np.inf, dtype=np.float32)
     limit_px[here] = bone_px[there]
     is_in_front = surroundings.disparity_px > limit_px
-    speaks, is_asked = surroundings.is_matched, limit_px < np.inf
-    for _ in range(_N_VOTES):
-        before = is_in_front.copy()
-        vote_on_guesses(surroundings.picture, speaks, is_asked, is_in_front)
-        speaks |= is_in_front & ~before
+    # Guesses follow what is matched beside them.
+    vote_on_guesses(surroundings.picture, surroundings.is_matched, limit_px < np.inf, is_in_front)
     if is_half:
         is_in_front = double(is_in_front.view(np.uint8), box).view(np.bool_)
         limit_px = double(np.float32(2.0) * limit_px, box)
