@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 _EXAMPLE = """\
 examples:
   navapp evaluate --quick --out look/            every case, one test of 5 frames: some minutes
-  navapp evaluate --out tables/                  all of it: about two hours on two cores
+  navapp evaluate --out tables/                  all of it: one to two hours on two cores
   navapp evaluate --stages opening --methods bimcc --tests 2 --out opening/
   navapp evaluate --peers --out tables/          other people's trackers beside them
   navapp evaluate --stress --out stress/         one thing at a time made worse: hours
