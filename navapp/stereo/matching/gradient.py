@@ -5,45 +5,38 @@ Algorithm 1 of its state-of-the-art section: cost (equation 2), aggregation, win
 paper puts behind them, `smooth_known`, moves them in between.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.bands import in_row_bands
 from navapp.geometry.box import Box
 from navapp.geometry.rectification import Image, RectifiedPair
-from navapp.stereo.matching.census_sgm import TwoViewDisparity, make_matched_map
-from navapp.stereo.matching.consistency import at_partner, view_difference_px
+from navapp.stereo.matching.census_sgm import (
+    TwoViewDisparity,
+    check_views,
+    make_answer,
+    make_nothing,
+)
+from navapp.stereo.matching.consistency_kernels import Demands, Evidence
 from navapp.stereo.matching.gradient_kernels import match_rows
-from navapp.stereo.matching.search import Crop, Search
+from navapp.stereo.matching.search import Search, contrast_grey, crop
 
 _PER_GREY = 16.0
 
 
-@dataclass(frozen=True, slots=True)
-class GradientSettings:
-    """How the baseline works."""
-
-    window_px: int = 11  # side of the window, odd
-    max_difference_px: float = 1.0  # between the two views
-    contrast_grey: int = 3  # a window with a smaller range of grey levels matches nothing
-    sigma_px: float = 0.5  # standard deviation that is claimed for every match
-
-    def __post_init__(self) -> None:
-        if self.window_px < 1 or self.window_px % 2 == 0:
-            raise ValueError(f"the window's side must be odd and positive, not {self.window_px}")
+# Of the square window.
+_RADIUS_PX = 5
+_SIGMA_PX = 0.5  # standard deviation that is claimed for every match
+# A window with a smaller range of grey levels matches nothing; views may differ by a pixel.
+_DEMANDS = Demands(3, np.float32(1.0), np.float32(1.0), np.float32(0.0))
 
 
-def match_gradient(
-    pair: RectifiedPair, band_px: tuple[float, float], settings: GradientSettings | None = None
-) -> TwoViewDisparity:
+def match_gradient(pair: RectifiedPair, band_px: tuple[float, float]) -> TwoViewDisparity:
     """Match the box of a rectified pair as the paper's state of the art does.
 
     Args:
         pair: rectified grey pictures; `pair.box` is matched and may reach beyond them.
         band_px: smallest and largest disparity expected.
-        settings: of the baseline.
 
     Returns:
         Both views over `pair.box`; inconsistent pixels of the left one are unknown, nothing is
@@ -56,34 +49,22 @@ def match_gradient(
     Source: Algorithm 1, equations (2) and (3). The printed m_r(x, y, d) is read as the right
     magnitude shifted by d, m_r(x - d, y).
     """
-    settings = settings or GradientSettings()
     search = Search.plan(pair, band_px)
-    box, inside = search.box, search.inside
-    left_px = np.full((inside.height, inside.width), np.nan, dtype=np.float32)
-    right_px = np.full((box.height, search.right.width), np.nan, dtype=np.float32)
-    if not search.is_empty:
-        top = inside.y - box.y
-        left_px, right_px[top : top + inside.height] = _match_both(pair, search, settings)
-    left = make_matched_map(search, left_px, settings.sigma_px)
-    is_matched = left.origin.astype(np.float32)
-    return TwoViewDisparity(left, right_px, search.right.x, is_matched, left.matched_fraction)
-
-
-def _match_both(
-    pair: RectifiedPair, search: Search, settings: GradientSettings
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Disparity of the left view's inside, checked, and of the right view."""
-    left_px, right_px = _winners(pair, search, settings)
-    # Left-right consistency check: the right view's winners come from the same cost.
-    is_matched = view_difference_px(left_px, right_px, search.shift) <= settings.max_difference_px
-    radius = settings.window_px // 2
-    left_spread, right_spread = (
-        Crop.of(image, box, (radius, radius)).contrast_grey()
+    if search.is_empty:
+        return make_nothing(search)
+    left_px, right_px = _winners(pair, search)
+    margin = (_RADIUS_PX, _RADIUS_PX)
+    left_contrast, right_contrast = (
+        contrast_grey(crop(image, box, margin), margin)
         for image, box in ((pair.left, search.inside), (pair.right, search.right))
     )
-    partner_spread = at_partner(right_spread, left_px, search.shift, np.uint8(0))
-    is_matched &= np.minimum(left_spread, partner_spread) >= settings.contrast_grey
-    return np.where(is_matched, left_px, np.float32(np.nan)), right_px
+    # Left-right consistency check: the right view's winners come from the same cost.
+    evidence = Evidence(
+        left_px, right_px, np.ones_like(left_px), left_contrast, right_contrast, search.shift
+    )
+    is_judged, _ = check_views(evidence, _DEMANDS)
+    is_matched = np.isfinite(left_px).astype(np.float32)
+    return make_answer(search, _SIGMA_PX, left_px, right_px, is_matched, is_judged)
 
 
 def smooth_known(values: NDArray[np.float32], sigma_px: float) -> NDArray[np.float32]:
@@ -119,15 +100,14 @@ def _magnitude_around(image: Image, box: Box, radius: int) -> NDArray[np.int32]:
 
 
 def _winners(
-    pair: RectifiedPair, search: Search, settings: GradientSettings
+    pair: RectifiedPair, search: Search
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Winners of the left view's inside and of the right view, unchecked; NaN where none."""
-    inside, n = search.inside, search.count
-    radius = settings.window_px // 2
+    inside, n, radius = search.inside, search.count, _RADIUS_PX
     first = inside.x - (search.lowest + n - 1)
     reached = Box(first, inside.y, inside.width + n - 1, inside.height)
     left, right = (
-        Crop.of(_magnitude_around(picture, box, radius), box, (radius, radius)).values
+        crop(_magnitude_around(picture, box, radius), box, (radius, radius))
         for picture, box in ((pair.left, inside), (pair.right, reached))
     )
     mirrored = np.ascontiguousarray(right[:, ::-1])
