@@ -121,7 +121,7 @@ def _add_nearer(matched: CoarseMatch, gap: Box, nearer: NearerSearch) -> TwoView
     np.copyto(confidence[there], double(near.confidence, gap), where=is_near)
     right_px, right_x0 = _join_right(found, near, gap, least_px)
     joined = DisparityMap(disparity_px, sigma_px, origin, left.x, left.y)
-    return TwoViewDisparity(joined, right_px, right_x0, confidence, found.agreement)
+    return TwoViewDisparity(right_px, right_x0, confidence, joined, found.agreement)
 
 
 def _join_right(

@@ -71,11 +71,9 @@ class CensusSettings:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TwoViewDisparity:
-    """What one aggregated cost says about both views."""
+class OtherView:
+    """What a fill asks besides the left map: the right view, and trust in the left one."""
 
-    # over the pair's box; only consistent pixels are matched, nothing is filled.
-    left: DisparityMap
     # (h, W) float32 disparity of the right view, whole pixels, NaN unknown; rows of the box.
     # Unchecked: what the right view prefers among the box's pixels.
     right_px: NDArray[np.float32]
@@ -83,6 +81,14 @@ class TwoViewDisparity:
     # (h, w) float32, 0 to 1, from uniqueness, texture and the agreement of the views; 0 where
     # unmatched.
     confidence: NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TwoViewDisparity(OtherView):
+    """What one aggregated cost says about both views."""
+
+    # over the pair's box; only consistent pixels are matched, nothing is filled.
+    left: DisparityMap
     # share of the pixels with contrast that are matched; tiny when the pictures are exchanged, NaN
     # when no pixel of either view has contrast.
     agreement: float
@@ -259,10 +265,10 @@ def make_answer(
     origin = np.isfinite(whole).astype(np.uint8) * np.uint8(Origin.MATCHED)
     n_judged = np.count_nonzero(is_judged)
     return TwoViewDisparity(
-        DisparityMap(whole, sigma, origin, box.x, box.y),
         right_rows,
         search.right.x,
         search.over_box(confidence, np.float32(0.0)),
+        DisparityMap(whole, sigma, origin, box.x, box.y),
         # Exchanged pictures give a tiny share. Only what was judged is matched.
         np.count_nonzero(origin) / n_judged if n_judged else np.nan,
     )

@@ -71,8 +71,6 @@ def smooth_known(values: NDArray[np.float32], sigma_px: float) -> NDArray[np.flo
     """Gaussian filter over the known pixels; unknown ones (NaN) stay unknown and weigh nothing."""
     import cv2
 
-    if sigma_px <= 0.0:
-        return values
     is_known = np.isfinite(values)
     weight = cv2.GaussianBlur(is_known.astype(np.float32), (0, 0), sigma_px)
     blurred = cv2.GaussianBlur(np.where(is_known, values, 0.0), (0, 0), sigma_px)

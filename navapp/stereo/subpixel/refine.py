@@ -59,7 +59,10 @@ MODEL_REFINEMENT = RefineSettings(systematic_px=0.08)
 
 
 def refine(
-    pair: RectifiedPair, support_px: NDArray[np.float32], settings: RefineSettings | None = None
+    pair: RectifiedPair,
+    support_px: NDArray[np.float32],
+    settings: RefineSettings | None = None,
+    stride_px: int = 1,
 ) -> DisparityMap:
     """Measure the disparity near a support.
 
@@ -68,9 +71,11 @@ def refine(
         support_px: (h, w) float32 disparity over the box, NaN where nothing is expected; within
             about half a pixel a step of the truth.
         settings: of the refinement.
+        stride_px: only every so many-th pixel each way is measured.
 
     Returns:
-        The map over `pair.box`; pixels that did not settle, correlate or show texture are unknown.
+        The map over `pair.box`, of the measured pixels only; those that did not settle, correlate
+        or show texture are unknown.
 
     Raises:
         ValueError: colour pictures, a support of another size than the box, or a box that reaches
@@ -79,43 +84,7 @@ def refine(
     Source: inverse-compositional image correlation (Pan et al. 2013) with gain and offset, on the
     model's own surface instead of a plane.
     """
-    return _accept(pair, support_px, settings or RefineSettings(), 1)
-
-
-def refine_samples(
-    pair: RectifiedPair,
-    support_px: NDArray[np.float32],
-    settings: RefineSettings,
-    stride_px: int,
-) -> DisparityMap:
-    """As `refine`, but only every `stride_px`-th pixel each way; the map holds only those."""
-    return _accept(pair, support_px, settings, stride_px)
-
-
-def refine_on_model(pair: RectifiedPair, support_px: NDArray[np.float32]) -> DisparityMap:
-    """As `refine`, on a model's own surface: nothing where hardly anything confirms it.
-
-    Chance and repeated texture confirm a few per cent of any support, in specks.
-    """
-    found = without_specks(refine(pair, support_px, MODEL_REFINEMENT))
-    n_expected = np.count_nonzero(np.isfinite(support_px))
-    if found.n_matched < _LEAST_CONFIRMED * n_expected:
-        return found.only(np.zeros(support_px.shape, dtype=np.bool_))
-    return found
-
-
-def without_specks(found: DisparityMap) -> DisparityMap:
-    """The map without small patches that stand alone."""
-    return found.only(large_smooth_regions(found.disparity_px, _SPECKLE_PX2, _SPECKLE_STEP_PX))
-
-
-def _accept(
-    pair: RectifiedPair,
-    support_px: NDArray[np.float32],
-    settings: RefineSettings,
-    stride_px: int,
-) -> DisparityMap:
-    """Every window that is good enough."""
+    settings = settings or RefineSettings()
     box = pair.box
     if pair.left.ndim != 2 or support_px.shape != (box.height, box.width):
         raise ValueError("refine needs grey pictures and a support of the box's size")
@@ -139,6 +108,23 @@ def _accept(
     )  # fmt: skip
     in_row_bands(len(disparity), accept)
     return DisparityMap(disparity, sigma, origin, box.x, box.y)
+
+
+def refine_on_model(pair: RectifiedPair, support_px: NDArray[np.float32]) -> DisparityMap:
+    """As `refine`, on a model's own surface: nothing where hardly anything confirms it.
+
+    Chance and repeated texture confirm a few per cent of any support, in specks.
+    """
+    found = without_specks(refine(pair, support_px, MODEL_REFINEMENT))
+    n_expected = np.count_nonzero(np.isfinite(support_px))
+    if found.n_matched < _LEAST_CONFIRMED * n_expected:
+        return found.only(np.zeros(support_px.shape, dtype=np.bool_))
+    return found
+
+
+def without_specks(found: DisparityMap) -> DisparityMap:
+    """The map without small patches that stand alone."""
+    return found.only(large_smooth_regions(found.disparity_px, _SPECKLE_PX2, _SPECKLE_STEP_PX))
 
 
 def _steps(
