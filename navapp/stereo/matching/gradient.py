@@ -18,10 +18,10 @@ from navapp.stereo.matching.census_sgm import (
     make_nothing,
 )
 from navapp.stereo.matching.consistency_kernels import Demands, Evidence
-from navapp.stereo.matching.gradient_kernels import match_rows
-from navapp.stereo.matching.search import Search, contrast_grey, crop
+from navapp.stereo.matching.search import MAX_DISPARITIES, Search, contrast_grey, crop
 
 _PER_GREY = 16.0
+_NOTHING = np.iinfo(np.int32).max
 
 
 # Of the square window.
@@ -52,7 +52,7 @@ def match_gradient(pair: RectifiedPair, band_px: tuple[float, float]) -> TwoView
     search = Search.plan(pair, band_px)
     if search.is_empty:
         return make_nothing(search)
-    left_px, right_px = _winners(pair, search)
+    left_px, right_px = find_winners(pair, search)
     margin = (_RADIUS_PX, _RADIUS_PX)
     left_contrast, right_contrast = (
         contrast_grey(crop(image, box, margin), margin)
@@ -79,52 +79,88 @@ def smooth_known(values: NDArray[np.float32], sigma_px: float) -> NDArray[np.flo
     return np.where(is_known, smooth, np.nan).astype(np.float32)
 
 
-def magnitude(image: Image) -> NDArray[np.int32]:
+def magnitude(image: Image) -> NDArray[np.uint16]:
     """(h, w) m = sqrt(gx^2 + gy^2) in 1/16 grey per px, from central differences."""
     padded = np.pad(image.astype(np.float32), 1, mode="edge")
     gx = 0.5 * (padded[1:-1, 2:] - padded[1:-1, :-2])
     gy = 0.5 * (padded[2:, 1:-1] - padded[:-2, 1:-1])
-    return np.asarray(np.rint(_PER_GREY * np.sqrt(gx * gx + gy * gy)), dtype=np.int32)
+    return np.asarray(np.rint(_PER_GREY * np.sqrt(gx * gx + gy * gy)), dtype=np.uint16)
 
 
-def _magnitude_around(image: Image, box: Box, radius: int) -> NDArray[np.int32]:
+def _magnitude_around(image: Image, box: Box, radius: int) -> NDArray[np.uint16]:
     """As `magnitude`, in a box and so far around it; 0 elsewhere."""
     height, width = image.shape
     # A pixel more: the outermost slopes of a part are one-sided.
     part = box.grow(radius + 1).clip(width, height).slices
-    found = np.zeros(image.shape, dtype=np.int32)
+    found = np.zeros(image.shape, dtype=np.uint16)
     found[part] = magnitude(image[part])
     return found
 
 
-def _winners(
+def find_winners(
     pair: RectifiedPair, search: Search
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Winners of the left view's inside and of the right view, unchecked; NaN where none."""
-    inside, n, radius = search.inside, search.count, _RADIUS_PX
-    first = inside.x - (search.lowest + n - 1)
-    reached = Box(first, inside.y, inside.width + n - 1, inside.height)
-    left, right = (
-        crop(_magnitude_around(picture, box, radius), box, (radius, radius))
-        for picture, box in ((pair.left, inside), (pair.right, reached))
+    """Disparity of the left view's inside and of the right view, unchecked; NaN where none.
+
+    Winner takes all; of equal costs the smallest disparity wins.
+    """
+    margin = (_RADIUS_PX, _RADIUS_PX)
+    views = tuple(
+        crop(_magnitude_around(picture, box, _RADIUS_PX), box, margin)
+        for picture, box in ((pair.left, search.inside), (pair.right, search.right))
     )
-    mirrored = np.ascontiguousarray(right[:, ::-1])
-    left_best = np.empty((inside.height, inside.width), dtype=np.int32)
-    right_best = np.empty((reached.height, reached.width), dtype=np.int32)
-    # Only partners inside the picture compete.
-    past = first + reached.width
-    columns = (past - search.right.x - search.right.width, past - search.right.x)
-    # SG(x, y, d) = 1 / w^2 sum over the window |m_l(x, y) - m_r(x - d, y)|         (equation 2)
-    # is the cost and, over the whole window, its aggregation CA; w^2 moves no minimum.
-    # d = arg min over D of CA(p, d)                                                (equation 3)
-    in_row_bands(
-        inside.height,
-        lambda rows: match_rows(left, mirrored, columns, rows, left_best, right_best),
+    best = tuple(
+        np.full((box.height, box.width), _NOTHING, dtype=np.int32)
+        for box in (search.inside, search.right)
     )
+    in_row_bands(search.inside.height, lambda rows: _choose(views, search, rows, best))
+    left, right = (offer % MAX_DISPARITIES for offer in best)
     # The best at the end of the search is no minimum.
-    is_minimum = (left_best > 0) & (left_best < n - 1)
-    left_px = np.where(is_minimum, left_best + search.lowest, np.nan).astype(np.float32)
-    # Columns of `reached` that lie outside the picture have no winners.
-    right_best = right_best[:, ::-1][:, search.right.x - first :][:, : search.right.width]
-    right_px = np.where(right_best >= 0, right_best + search.lowest, np.nan).astype(np.float32)
+    is_minimum = (best[0] < _NOTHING) & (left > 0) & (left < search.count - 1)
+    left_px = np.where(is_minimum, left + search.lowest, np.nan).astype(np.float32)
+    right_px = np.where(best[1] < _NOTHING, right + search.lowest, np.nan).astype(np.float32)
     return left_px, right_px
+
+
+def _choose(
+    views: tuple[NDArray[np.uint16], ...],
+    search: Search,
+    rows: tuple[int, int],
+    best: tuple[NDArray[np.int32], ...],
+) -> None:
+    """What is best in both views for some rows.
+
+    The right view's cost of pixel u at disparity d is that of left pixel u + d.
+
+    Args:
+        views: magnitudes of `search.inside` and `search.right`, with a margin of the window's
+            radius.
+        search: what is searched.
+        rows: first, and after the last, to fill.
+        best: (h, w) and (h, W) in place: lowest cost * `MAX_DISPARITIES` + its disparity's number.
+    """
+    import cv2
+
+    window, here = 2 * _RADIUS_PX + 1, slice(*rows)
+    left, right = (view[rows[0] : rows[1] + window - 1] for view in views)
+    for k in range(search.count):
+        # Only partners inside the picture compete.
+        offset = search.shift - search.lowest - k
+        first = max(-offset, 0)
+        after = min(search.inside.width, search.right.width - offset)
+        if first >= after:
+            continue
+        # SG(x, y, d) = 1 / w^2 sum over the window |m_l(x, y) - m_r(x - d, y)|     (equation 2)
+        # is the cost and, over the whole window, its aggregation CA; w^2 moves no minimum.
+        # d = arg min over D of CA(p, d)                                            (equation 3)
+        seen, faced = slice(first, after), slice(first + offset, after + offset)
+        difference = cv2.absdiff(
+            left[:, first : after + window - 1], right[:, faced.start : faced.stop + window - 1]
+        )
+        sums = cv2.boxFilter(difference, cv2.CV_32S, (window, window), normalize=False)
+        offer = sums[_RADIUS_PX:-_RADIUS_PX, _RADIUS_PX:-_RADIUS_PX]
+        offer *= MAX_DISPARITIES
+        offer += k
+        for lowest, columns in zip(best, (seen, faced), strict=True):
+            part = lowest[here, columns]
+            np.minimum(part, offer, out=part)
