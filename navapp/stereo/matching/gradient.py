@@ -20,10 +20,10 @@ from navapp.stereo.matching.census_sgm import (
 from navapp.stereo.matching.consistency_kernels import Demands, Evidence
 from navapp.stereo.matching.search import MAX_DISPARITIES, Search, contrast_grey, crop
 
+# Magnitudes are whole numbers of 1/16 grey: sums over windows are exact, and stay below 2^21 ...
 _PER_GREY = 16.0
+# ... so that a cost and the number of its disparity, below 2^10, fit together into 31 bits.
 _NOTHING = np.iinfo(np.int32).max
-
-
 # Of the square window.
 _RADIUS_PX = 5
 _SIGMA_PX = 0.5  # standard deviation that is claimed for every match

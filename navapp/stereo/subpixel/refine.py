@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.bands import in_row_bands
+from navapp.geometry.box import Box
 from navapp.geometry.masks import large_smooth_regions
-from navapp.geometry.rectification import RectifiedPair
+from navapp.geometry.rectification import RectifiedPair, find_reached
 from navapp.geometry.zbuffer import find_known_range
 from navapp.stereo.subpixel.refine_kernels import (
     CORRELATION,
@@ -26,8 +27,6 @@ from navapp.stereo.subpixel.refine_kernels import (
 )
 from navapp.values import DisparityMap
 
-# What the steps and the interpolation need on either side.
-_SPARE_COLUMNS = 8
 # Of the support, to see where it lies.
 _SAMPLE_PX = 4
 _LEAST_CONFIRMED = 0.1
@@ -135,13 +134,12 @@ def _steps(
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """(h, w) offset px from the support, and (h, w, 4) / stride what the last step says of it."""
     box = pair.box
-    rows = slice(box.y, box.y + box.height)
-    columns = _find_reached_columns(support, box.x, pair.right.shape[1])
-    seen = pair.left[rows, box.x : box.x + box.width]
+    columns = _find_reached_columns(support, box, pair.right.shape[1])
+    seen = pair.left[box.slices]
     # About a middle value, the products of float32 keep their digits.
     centre = np.float32(seen[::_SAMPLE_PX, ::_SAMPLE_PX].mean() if seen.size else 0.0)
     left = np.subtract(seen, centre, dtype=np.float32)
-    right = np.subtract(pair.right[rows, columns], centre, dtype=np.float32)
+    right = np.subtract(pair.right[box.slices[0], columns], centre, dtype=np.float32)
     radius, offset, refined = settings.radius_px, np.zeros_like(support), np.empty_like(support)
     least = settings.min_filled * (2 * radius + 1) ** 2
     height, width = (-(-length // stride_px) for length in support.shape)
@@ -175,13 +173,10 @@ def _is_at_rest(quality: NDArray[np.float32], settings: RefineSettings) -> bool:
     return bool(2 * np.count_nonzero(is_small) >= len(step))
 
 
-def _find_reached_columns(
-    support: NDArray[np.float32], first_column: int, picture_width: int
-) -> slice:
+def _find_reached_columns(support: NDArray[np.float32], box: Box, picture_width: int) -> slice:
     """Columns of the right picture that some pixel's window can ask for."""
     farthest, nearest = find_known_range(support)
     if farthest > nearest:
         return slice(0, 0)
-    first = int(first_column - nearest) - _SPARE_COLUMNS
-    last = int(first_column + support.shape[1] - farthest) + _SPARE_COLUMNS
-    return slice(min(max(first, 0), picture_width), max(min(last, picture_width), 0))
+    _, reached = find_reached(box, (farthest, nearest))
+    return reached.clip(picture_width, box.y + box.height).slices[1]
