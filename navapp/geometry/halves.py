@@ -32,3 +32,12 @@ def inside_of_halves(box: Box) -> tuple[slice, slice]:
     """The box's rows and columns among the pixels that its half covers."""
     top, left = box.y % 2, box.x % 2
     return slice(top, top + box.height), slice(left, left + box.width)
+
+
+def mean_blocks(values: NDArray[T], reduction: int) -> NDArray[T]:
+    """(h / reduction, w / reduction) means of blocks."""
+    import cv2
+
+    size = values.shape[1] // reduction, values.shape[0] // reduction
+    reduced = cv2.resize(values, size, interpolation=cv2.INTER_AREA)  # type: ignore[arg-type]
+    return np.asarray(reduced, dtype=values.dtype)

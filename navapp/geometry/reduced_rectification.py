@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +9,7 @@ from numpy.typing import NDArray
 from navapp.geometry.bilinear import lens_maps
 from navapp.geometry.box import Box
 from navapp.geometry.camera import Camera
+from navapp.geometry.halves import mean_blocks
 from navapp.geometry.rectification import (
     Image,
     RectifiedPair,
@@ -94,7 +94,7 @@ def _resample(
     asked = _box_around(x, y).clip(width, height)
     if not asked.is_empty:
         block = Box(*(reduction * n for n in (asked.x, asked.y, asked.width, asked.height)))
-        reduced = _reduce(luma(picture[block.slices]), reduction)
+        reduced = mean_blocks(luma(picture[block.slices]), reduction)
         places = x - np.float32(asked.x), y - np.float32(asked.y)
         resampled[part.slices] = cv2.remap(reduced, *places, cv2.INTER_LINEAR)
     return resampled
@@ -106,11 +106,3 @@ def _box_around(x: NDArray[np.float32], y: NDArray[np.float32]) -> Box:
         (math.floor(places.min()), math.ceil(places.max())) for places in (x, y)
     )
     return Box(first_x, first_y, last_x - first_x + 1, last_y - first_y + 1)
-
-
-def _reduce(values: Image, reduction: int) -> NDArray[Any]:
-    """(h / reduction, w / reduction) means of blocks."""
-    import cv2
-
-    height, width = (length // reduction for length in values.shape)
-    return np.asarray(cv2.resize(values, (width, height), interpolation=cv2.INTER_AREA))

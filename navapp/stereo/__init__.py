@@ -7,23 +7,18 @@ from navapp.stereo.chains import (
     match_scene,
     match_surface,
 )
-from navapp.stereo.coarse import CoarseMap, are_swapped, find_near_clipped, match_coarsely
+from navapp.stereo.coarse import CLIPPED_REACH_PX, CoarseMap, are_swapped, match_coarsely
 from navapp.stereo.health import PictureHealth, StereoHealth, measure_health
-from navapp.stereo.subpixel.refine import (
-    MODEL_REFINEMENT,
-    RefineSettings,
-    refine,
-    refine_on_model,
-    refine_samples,
-)
+from navapp.stereo.matte_pictures import find_near_clipped
+from navapp.stereo.subpixel.refine import MODEL_REFINEMENT, refine, refine_on_model
 from navapp.stereo.surroundings import NearerSearch, fill_surroundings, match_nearer
 
 __all__ = [
+    "CLIPPED_REACH_PX",
     "MODEL_REFINEMENT",
     "CoarseMap",
     "NearerSearch",
     "PictureHealth",
-    "RefineSettings",
     "StereoAnswer",
     "StereoHealth",
     "are_swapped",
@@ -38,5 +33,4 @@ __all__ = [
     "measure_health",
     "refine",
     "refine_on_model",
-    "refine_samples",
 ]

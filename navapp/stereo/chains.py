@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.rectification import RectifiedPair
-from navapp.stereo.coarse import LEAST_AGREEMENT, Evidence, clip_box, coarse_surface
-from navapp.stereo.matching.census_sgm import CensusSettings, match_census
+from navapp.stereo.coarse import LEAST_AGREEMENT, CoarseMatch, clip_box, smooth_steps
+from navapp.stereo.matching.census_sgm import CensusSettings, OtherView, match_census
 from navapp.stereo.matching.gradient import match_gradient, smooth_known
 from navapp.stereo.occlusion.classify import classify, project_to_right
 from navapp.stereo.occlusion.wls_fill import FillSettings, fill_wls
@@ -64,9 +64,8 @@ def match_scene(
     if not found.agreement >= LEAST_AGREEMENT:
         return _nothing(pair, _why(found.agreement), watch)
     left = refine_scene(pair, found.left)
-    evidence = Evidence(found.right_px, found.right_x0, found.confidence)
     fill = FillSettings(max_gap_px=max_gap_px) if fills else None
-    return _answer(pair, left, evidence, fill, watch)
+    return _answer(pair, left, found, fill, watch)
 
 
 def match_surface(
@@ -83,12 +82,14 @@ def match_surface(
     """
     watch = Stopwatch()
     pair = clip_box(pair)
-    coarse = coarse_surface(pair, band_px)
-    if not coarse.agreement >= LEAST_AGREEMENT:
-        return _nothing(pair, _why(coarse.agreement), watch)
-    left = refine_surface(pair, coarse.surface_px)
+    coarse = CoarseMatch.of(pair, band_px)
+    found = coarse.found
+    if not found.agreement >= LEAST_AGREEMENT:
+        return _nothing(pair, _why(found.agreement), watch)
+    surface_px = coarse.at_full(smooth_steps(found.left.disparity_px), pair.box)
+    left = refine_surface(pair, surface_px)
     fill = FillSettings(max_gap_px=max_gap_px) if fills else None
-    return _answer(pair, left, coarse.evidence, fill, watch)
+    return _answer(pair, left, coarse.other_view(pair.box), fill, watch)
 
 
 def match_on_support(
@@ -115,9 +116,9 @@ def match_on_support(
         return StereoAnswer(left, left, (), watch.timings)
     # What the right camera sees of the support is all that is known of its view.
     right_px = project_to_right(support_px, left.x, pair.geometry.width)
-    evidence = Evidence(right_px, 0, _by_sigma(left))
+    other = OtherView(right_px, 0, _by_sigma(left))
     fill = FillSettings(max_gap_px=max_gap_px)
-    return _answer(pair, left, evidence, fill, watch, np.isfinite(support_px))
+    return _answer(pair, left, other, fill, watch, np.isfinite(support_px))
 
 
 def match_baseline(
@@ -138,23 +139,18 @@ def match_baseline(
         return _nothing(pair, _NO_CONTRAST, watch)
     if in_patches < _LEAST_IN_PATCHES * matched_fraction:
         return _nothing(pair, _DISAGREEMENT, watch)
-    evidence = Evidence(found.right_px, found.right_x0, found.confidence)
-    answer = _answer(pair, found.left, evidence, FillSettings() if fills else None, watch)
-    smooth = _filter_gaussian(answer.disparity)
+    answer = _answer(pair, found.left, found, FillSettings() if fills else None, watch)
+    # The paper's noise filter, over the known pixels.
+    smooth_px = smooth_known(answer.disparity.disparity_px, _GAUSSIAN_SIGMA_PX)
+    smooth = replace(answer.disparity, disparity_px=smooth_px)
     watch.lap("fill" if fills else "stereo")
     return replace(answer, disparity=smooth, timings=watch.timings)
-
-
-def _filter_gaussian(disparity: DisparityMap) -> DisparityMap:
-    """The paper's noise filter, over the known pixels."""
-    smooth_px = smooth_known(disparity.disparity_px, _GAUSSIAN_SIGMA_PX)
-    return replace(disparity, disparity_px=smooth_px)
 
 
 def _answer(
     pair: RectifiedPair,
     left: DisparityMap,
-    evidence: Evidence,
+    other: OtherView,
     fill: FillSettings | None,
     watch: Stopwatch,
     is_expected: NDArray[np.bool_] | None = None,
@@ -163,11 +159,11 @@ def _answer(
     watch.lap("stereo")
     if fill is None:
         return StereoAnswer(left, left, (), watch.timings)
-    picture = _box_of(pair)
-    classes = classify(left, evidence.right_px, evidence.right_x0, pair.geometry.width, picture)
+    picture = pair.left[pair.box.slices]
+    classes = classify(left, other.right_px, other.right_x0, pair.geometry.width, picture)
     if is_expected is not None:
         classes[~is_expected] = 0
-    filled = fill_wls(left, picture, evidence.confidence, classes, fill)
+    filled = fill_wls(left, picture, other.confidence, classes, fill)
     watch.lap("fill")
     return StereoAnswer(filled, left, (), watch.timings)
 
@@ -196,8 +192,3 @@ def _nothing(pair: RectifiedPair, why: str, watch: Stopwatch) -> StereoAnswer:
     nothing = DisparityMap(unknown, unknown, np.zeros(unknown.shape, np.uint8), box.x, box.y)
     watch.lap("stereo")
     return StereoAnswer(nothing, nothing, (why,), watch.timings)
-
-
-def _box_of(pair: RectifiedPair) -> NDArray[np.uint8]:
-    box = pair.box
-    return pair.left[box.y : box.y + box.height, box.x : box.x + box.width]

@@ -5,18 +5,22 @@ pixel of the half is the mean of four, pixel k lies at 2 k + 0.5 of the whole, a
 the whole is exactly twice that of the half.
 """
 
-import math
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.box import Box
-from navapp.geometry.halves import double, half_box, inside_of_halves
+from navapp.geometry.halves import double, half_box, inside_of_halves, mean_blocks
 from navapp.geometry.masks import where
-from navapp.geometry.rectification import Image, RectifiedPair
-from navapp.stereo.matching.census_sgm import CensusSettings, TwoViewDisparity, match_census
-from navapp.stereo.matte_pictures import find_clipped
+from navapp.geometry.rectification import Image, RectifiedPair, find_reached
+from navapp.geometry.resampling import TAPS_PX
+from navapp.stereo.matching.census_sgm import (
+    CensusSettings,
+    OtherView,
+    TwoViewDisparity,
+    match_census,
+)
 from navapp.stereo.subpixel.regional import RegionalSettings, regional_support
 
 # Below this share of left-right agreement the two pictures do not show the same scene that way
@@ -31,68 +35,45 @@ _COARSE_SURFACE = RegionalSettings(radius_px=8, node_px=4, thin=1, scales_px=(1.
 _CALM_PX = 5
 _COARSE_STEP_PX = 0.5
 _FAR_FROM_MATCH_PX = 1.5
-# What windows and the steps at the ends of a search ask for beside a box, at half resolution.
-WINDOW_PX = 8
 # Half the census window of a map at half resolution, in pixels of the whole.
-_CLIPPED_REACH_PX = 2 * SURFACE_CENSUS.radius_x
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Evidence:
-    """What the fill asks besides the left map, at full resolution: the other view, and trust."""
-
-    right_px: NDArray[np.float32]
-    right_x0: int
-    confidence: NDArray[np.float32]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class CoarseSurface:
-    """A matched surface without steps, at full resolution, and what else the matcher saw."""
-
-    surface_px: NDArray[np.float32]
-    evidence: Evidence
-    agreement: float
-
-
-def coarse_surface(pair: RectifiedPair, band_px: tuple[float, float]) -> CoarseSurface:
-    """Of the part of `pair.box` inside the pictures.
-
-    Args:
-        pair: rectified grey pictures, clipped.
-        band_px: smallest and largest disparity expected.
-    """
-    return (_coarse_at_half if _is_wide(pair, band_px) else _coarse_at_full)(pair, band_px)
-
-
-def _is_wide(pair: RectifiedPair, band_px: tuple[float, float]) -> bool:
-    return pair.box.width * pair.box.height * (band_px[1] - band_px[0]) > _FEW_CELLS
-
-
-def _coarse_at_full(pair: RectifiedPair, band_px: tuple[float, float]) -> CoarseSurface:
-    found = match_census(pair, band_px, SURFACE_CENSUS)
-    evidence = Evidence(found.right_px, found.right_x0, found.confidence)
-    return CoarseSurface(smooth_steps(found.left.disparity_px), evidence, found.agreement)
-
-
-def _coarse_at_half(pair: RectifiedPair, band_px: tuple[float, float]) -> CoarseSurface:
-    low, high = band_px
-    found = match_census(halve(pair, band_px), (low / 2.0, high / 2.0), SURFACE_CENSUS)
-    surface_px = double_disparity(smooth_steps(found.left.disparity_px), pair.box)
-    right = replace(pair.box, x=2 * found.right_x0, width=2 * found.right_px.shape[1])
-    right_px = np.float32(2.0) * double(found.right_px, right)
-    evidence = Evidence(right_px, right.x, double(found.confidence, pair.box))
-    return CoarseSurface(surface_px, evidence, found.agreement)
+CLIPPED_REACH_PX = 2 * SURFACE_CENSUS.radius_x
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CoarseMatch:
-    """The matches behind a coarse map, at the resolution they were made in."""
+    """Matches to about a pixel, at the resolution they were made in."""
 
     pair: RectifiedPair
     is_half: bool  # halved from the pictures
     found: TwoViewDisparity
     band_px: tuple[float, float]  # disparities that were searched, at that resolution
+
+    @classmethod
+    def of(cls, pair: RectifiedPair, band_px: tuple[float, float]) -> "CoarseMatch":
+        """Match a pair, at half its resolution where that leaves enough of the picture.
+
+        Args:
+            pair: rectified grey pictures, its box in them.
+            band_px: smallest and largest disparity expected.
+        """
+        is_half = pair.box.width * pair.box.height * (band_px[1] - band_px[0]) > _FEW_CELLS
+        if is_half:
+            band_px = band_px[0] / 2.0, band_px[1] / 2.0
+            pair = halve(pair, band_px)
+        return cls(pair, is_half, match_census(pair, band_px, SURFACE_CENSUS), band_px)
+
+    def at_full(self, surface_px: NDArray[np.float32], box: Box) -> NDArray[np.float32]:
+        """A surface of these matches at full resolution, over the box that was asked for."""
+        return double_disparity(surface_px, box) if self.is_half else surface_px
+
+    def other_view(self, box: Box) -> OtherView:
+        """What a fill at full resolution asks, over the box that was asked for."""
+        found = self.found
+        if not self.is_half:
+            return found
+        right = replace(box, x=2 * found.right_x0, width=2 * found.right_px.shape[1])
+        right_px = np.float32(2.0) * double(found.right_px, right)
+        return OtherView(right_px, right.x, double(found.confidence, box))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,33 +99,12 @@ def match_coarsely(pair: RectifiedPair, band_px: tuple[float, float]) -> CoarseM
         band_px: smallest and largest disparity expected.
     """
     pair = clip_box(pair)
-    is_half = _is_wide(pair, band_px)
-    small = halve(pair, band_px) if is_half else pair
-    if is_half:
-        band_px = band_px[0] / 2.0, band_px[1] / 2.0
-    found = match_census(small, band_px, SURFACE_CENSUS)
-    if not found.agreement >= LEAST_AGREEMENT:
+    matched = CoarseMatch.of(pair, band_px)
+    if not matched.found.agreement >= LEAST_AGREEMENT:
         unknown = np.full((pair.box.height, pair.box.width), np.nan, dtype=np.float32)
         return CoarseMap(unknown, pair.box)
-    surface_px = calm(found.left.disparity_px)
-    surface_px = double_disparity(surface_px, pair.box) if is_half else surface_px
-    return CoarseMap(surface_px, pair.box, CoarseMatch(small, is_half, found, band_px))
-
-
-def find_near_clipped(pair: RectifiedPair) -> NDArray[np.bool_]:
-    """(h, w) pixels of the pair's box whose coarse disparity may come from clipped pixels.
-
-    A lamp that is reflected in a convex wet surface has its image behind the surface, and is
-    matched there. Clipped pixels outside the box are not looked at.
-
-    Args:
-        pair: rectified grey pictures; the box lies in them.
-    """
-    import cv2
-
-    is_clipped = find_clipped(pair.left[pair.box.slices]).astype(np.uint8)
-    size = 2 * _CLIPPED_REACH_PX + 1
-    return np.asarray(cv2.dilate(is_clipped, np.ones((size, size), np.uint8)) > 0)
+    surface_px = matched.at_full(calm(matched.found.left.disparity_px), pair.box)
+    return CoarseMap(surface_px, pair.box, matched)
 
 
 def are_swapped(
@@ -159,9 +119,9 @@ def are_swapped(
         band_px: smallest and largest disparity of the scene around the box.
         exchanged: the same, left called right before they were rectified.
     """
-    if coarse_surface(clip_box(given), band_px).agreement >= LEAST_AGREEMENT:
+    if CoarseMatch.of(clip_box(given), band_px).found.agreement >= LEAST_AGREEMENT:
         return False
-    return coarse_surface(clip_box(exchanged), band_px).agreement >= _MOST_AGREE
+    return CoarseMatch.of(clip_box(exchanged), band_px).found.agreement >= _MOST_AGREE
 
 
 def clip_box(pair: RectifiedPair) -> RectifiedPair:
@@ -205,43 +165,28 @@ def calm(coarse_px: NDArray[np.float32]) -> NDArray[np.float32]:
     return where(around, mean, np.float32(np.nan))
 
 
-def halve(pair: RectifiedPair, band_px: tuple[float, float] | None = None) -> RectifiedPair:
+def halve(pair: RectifiedPair, band_px: tuple[float, float]) -> RectifiedPair:
     """The pair at half its resolution; an odd last row or column is left out.
 
     Args:
         pair: rectified grey pictures.
-        band_px: smallest and largest disparity. With it only the pair's box, and what it reaches in
-            the right picture, is made; the rest is 0.
+        band_px: smallest and largest disparity, in pixels of the half. Only the pair's box, and
+            what it reaches in the right picture, is made; the rest is 0.
     """
-    height, width = (length // 2 for length in pair.left.shape)
-    half, whole = half_box(pair.box), Box(0, 0, width, height)
-    in_left = in_right = whole
-    if band_px is not None:
-        in_left = half.grow(WINDOW_PX)
-        # From the farthest partner of the first column to the nearest of the last.
-        farthest, nearest = math.ceil(band_px[1] / 2.0), math.floor(band_px[0] / 2.0)
-        first, after = in_left.x - farthest, in_left.x + in_left.width - nearest
-        in_right = replace(in_left, x=first, width=max(after - first, 0))
-    return RectifiedPair(
-        _halve(pair.left, in_left.clip(width, height), whole),
-        _halve(pair.right, in_right.clip(width, height), whole),
-        pair.geometry.reduced(2),
-        half,
-    )
+    half = half_box(pair.box)
+    # Windows and the steps at the ends of a search ask for no more than interpolation does.
+    in_left, in_right = find_reached(half.grow(TAPS_PX), band_px)
+    left, right = _halve(pair.left, in_left), _halve(pair.right, in_right)
+    return RectifiedPair(left, right, pair.geometry.reduced(2), half)
 
 
-def _halve(image: Image, part: Box, whole: Box) -> Image:
+def _halve(image: Image, part: Box) -> Image:
     """A part (of the half) of a picture at half its resolution; 0 elsewhere."""
-    import cv2
-
-    small = np.zeros((whole.height, whole.width), dtype=np.uint8)
+    small = np.zeros([length // 2 for length in image.shape], dtype=np.uint8)
+    part = part.clip(small.shape[1], small.shape[0])
     if not part.is_empty:
-        rows, columns = (
-            slice(part.y, part.y + part.height), slice(part.x, part.x + part.width)
-        )  # fmt: skip
-        even = image[2 * rows.start : 2 * rows.stop, 2 * columns.start : 2 * columns.stop]
-        size = (part.width, part.height)
-        cv2.resize(even, size, dst=small[rows, columns], interpolation=cv2.INTER_AREA)
+        covered = Box(2 * part.x, 2 * part.y, 2 * part.width, 2 * part.height)
+        small[part.slices] = mean_blocks(image[covered.slices], 2)
     return small
 
 

@@ -112,10 +112,7 @@ def _rows(pair: RectifiedPair, found: DisparityMap) -> tuple[float, float, int, 
 def _picture_health(picture: Image, box: Box) -> PictureHealth:
     """Of the part of the box that lies in the picture; of nothing, all dark."""
     inside = box.clip(picture.shape[1], picture.shape[0])
-    part = picture[
-        inside.y : inside.y + inside.height : _ROWS_APART,
-        inside.x : inside.x + inside.width : _COLUMNS_APART,
-    ]
+    part = picture[inside.slices][::_ROWS_APART, ::_COLUMNS_APART]
     if part.size == 0 or part.shape[0] < 2:
         return PictureHealth(1.0, 0.0, 0.0)
     part = part.astype(np.float32)

@@ -10,7 +10,6 @@ Source: the dichromatic model of reflection, Shafer 1985.
 """
 
 from dataclasses import replace
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,11 +22,18 @@ _MOST_SHARE, _MOST_VALUE = 0.99, 230.0
 _LEAST_DIFFERENCE = 0.02
 # Values from here on may be clipped.
 _CLIPPED = 254
+# Pixels so far from a clipped one are resampled from it: they are filled too.
+RESAMPLED_REACH_PX = 1
 # Of the weights by which clipped pixels are filled (standard deviation).
 _FILL_PX = 2.0
 _LEAST_WEIGHT = 1e-3
 # Windows reach beyond a box, which follows the bone by a few pixels.
 _AROUND_PX = 24
+# (256,) linear light of a value (IEC 61966-2-1).
+_VALUE = np.arange(256) / 255.0
+_LIGHT_OF_VALUE = np.where(
+    _VALUE <= 0.04045, _VALUE / 12.92, ((_VALUE + 0.055) / 1.055) ** 2.4
+).astype(np.float32)
 
 
 def make_matte_pair(
@@ -42,6 +48,8 @@ def make_matte_pair(
         is_asked: (h, w) pixels of its box that set the range of values.
         blue: weight of blue: red over blue of the lamp's light in these pictures.
     """
+    import cv2
+
     if pair.left.ndim != 3 or not is_asked.any():
         return None
     box = pair.box
@@ -53,16 +61,19 @@ def make_matte_pair(
         return None
     gain = _MOST_VALUE / most
     pictures = np.zeros((2, *pair.left.shape[:2]), dtype=np.uint8)
-    pictures[0, first:last], pictures[1, first:last] = _scale(left, gain), _scale(right, gain)
+    for picture, difference in zip(pictures, (left, right), strict=True):
+        # Rounds, and clips to what fits.
+        picture[first:last] = cv2.convertScaleAbs(np.maximum(difference, 0.0), alpha=gain)
     return replace(pair, left=pictures[0], right=pictures[1])
 
 
-def find_filled(picture: Image) -> NDArray[np.bool_]:
-    """(H, W) pixels that `make_matte_pair` fills: clipped, or resampled from clipped ones."""
+def find_near_clipped(picture: Image, reach_px: int) -> NDArray[np.bool_]:
+    """(H, W) pixels that are clipped, or up to so far (rows, columns) from one that is."""
     import cv2
 
     is_clipped = find_clipped(picture).astype(np.uint8)
-    return np.asarray(cv2.dilate(is_clipped, np.ones((3, 3), np.uint8)) > 0)
+    size = 2 * reach_px + 1
+    return np.asarray(cv2.dilate(is_clipped, np.ones((size, size), np.uint8)) > 0)
 
 
 def find_clipped(picture: Image) -> NDArray[np.bool_]:
@@ -76,9 +87,9 @@ def find_clipped(picture: Image) -> NDArray[np.bool_]:
 def _red_less_blue(picture: Image, blue: float) -> NDArray[np.float32]:
     import cv2
 
-    light = _light_of_value()
-    red, less = cv2.LUT(picture[:, :, 2], light), cv2.LUT(picture[:, :, 0], light)
-    return _fill(np.asarray(red - np.float32(blue) * less), find_filled(picture))
+    red, less = (cv2.LUT(picture[:, :, channel], _LIGHT_OF_VALUE) for channel in (2, 0))
+    is_unknown = find_near_clipped(picture, RESAMPLED_REACH_PX)
+    return _fill(np.asarray(red - np.float32(blue) * less), is_unknown)
 
 
 def _fill(values: NDArray[np.float32], is_unknown: NDArray[np.bool_]) -> NDArray[np.float32]:
@@ -92,18 +103,3 @@ def _fill(values: NDArray[np.float32], is_unknown: NDArray[np.bool_]) -> NDArray
     total = cv2.GaussianBlur(weight, (0, 0), _FILL_PX)
     filled = around / np.maximum(total, np.float32(_LEAST_WEIGHT))
     return np.where(is_unknown, filled, values).astype(np.float32)
-
-
-def _scale(difference: NDArray[np.float32], gain: float) -> Image:
-    import cv2
-
-    # Rounds, and clips to what fits.
-    return np.asarray(cv2.convertScaleAbs(np.maximum(difference, 0.0), alpha=gain), dtype=np.uint8)
-
-
-@lru_cache(maxsize=1)
-def _light_of_value() -> NDArray[np.float32]:
-    """(256,) linear light of a value (IEC 61966-2-1)."""
-    value = np.arange(256) / 255.0
-    light = np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4)
-    return light.astype(np.float32)

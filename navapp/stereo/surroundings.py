@@ -15,7 +15,7 @@ from navapp.geometry.halves import double, half_box
 from navapp.geometry.rectification import RectifiedPair
 from navapp.stereo.coarse import SURFACE_CENSUS, CoarseMap, CoarseMatch
 from navapp.stereo.matching.census_sgm import TwoViewDisparity, match_census
-from navapp.stereo.matching.search import Crop
+from navapp.stereo.matching.search import crop
 from navapp.stereo.occlusion.bound_kernels import drop_beyond_bound
 from navapp.stereo.occlusion.classify import classify
 from navapp.stereo.occlusion.wls_fill import FillSettings, fill_gaps
@@ -74,7 +74,7 @@ def fill_surroundings(coarse: CoarseMap) -> Surroundings:
         return Surroundings(unknown, nothing, coarse.box, False, nothing)
     pair, found = matched.pair, matched.found
     # The half of an odd picture lacks its last column or row, the half of a box has it.
-    picture = Crop.of(pair.left, pair.box, (0, 0)).inner
+    picture = crop(pair.left, pair.box, (0, 0))
     classes = classify(found.left, found.right_px, found.right_x0, pair.geometry.width, picture)
     disparity_px, origin = fill_gaps(found.left, picture, found.confidence, classes, _FILL)
     drop_beyond_bound(disparity_px, origin, _EDGE_PX, _LAYER_PX)
@@ -121,7 +121,7 @@ def _add_nearer(matched: CoarseMatch, gap: Box, nearer: NearerSearch) -> TwoView
     np.copyto(confidence[there], double(near.confidence, gap), where=is_near)
     right_px, right_x0 = _join_right(found, near, gap, least_px)
     joined = DisparityMap(disparity_px, sigma_px, origin, left.x, left.y)
-    return TwoViewDisparity(joined, right_px, right_x0, confidence, found.agreement)
+    return TwoViewDisparity(right_px, right_x0, confidence, joined, found.agreement)
 
 
 def _join_right(

@@ -1,7 +1,6 @@
 """Checks of a measurement that need no fitted pose: they run on the helper, beside the fit."""
 
 import threading
-from dataclasses import replace
 from functools import partial
 from typing import NamedTuple, Self
 
@@ -13,6 +12,7 @@ from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.transform import RigidTransform
 from navapp.registration.verdict import Agreement
 from navapp.stereo import (
+    CLIPPED_REACH_PX,
     CoarseMap,
     NearerSearch,
     StereoHealth,
@@ -129,7 +129,7 @@ def _run_check(
     if coarse_px is None:
         coarse = meter.measure_coarsely(pair, pose, found.box)
         coarse_px = None if coarse is None else coarse.disparity_px
-    is_near_clipped = find_near_clipped(replace(pair, box=found.box))
+    is_near_clipped = find_near_clipped(pair.left[found.box.slices], CLIPPED_REACH_PX)
     agreement = None
     if view is not None:
         agreement = compare(view, meter.model, found, meter.geometry, coarse_px, is_near_clipped)

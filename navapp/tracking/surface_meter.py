@@ -26,8 +26,8 @@ from navapp.stereo import (
     NearerSearch,
     match_coarsely,
     match_surface,
+    refine,
     refine_on_model,
-    refine_samples,
 )
 from navapp.values import DisparityMap, Origin, SurfaceCloud
 
@@ -259,7 +259,7 @@ class SurfaceMeter:
         Rims of large gaps are kept.
         """
         support_px = expected.support_px
-        thin = refine_samples(expected.pair, support_px, _SAMPLED, _SAMPLES_PX)
+        thin = refine(expected.pair, support_px, _SAMPLED, _SAMPLES_PX)
         asked = support_px[::_SAMPLES_PX, ::_SAMPLES_PX]
         n_asked = max(int(np.count_nonzero(np.isfinite(asked))), 1)
         matched_fraction = int(np.count_nonzero(thin.origin)) / n_asked

@@ -6,7 +6,8 @@ import numpy as np
 def match(left, right, radius, n, inside):
     """Numbers of the best disparities of the left and of the right view; -1 without a partner.
 
-    Args: as of the kernel `match_rows`; the left pixel x at number k has the right partner
+    Args: magnitudes of the left part and of all its partners, both with a margin of the window's
+    radius; the number of disparities. The left pixel x at number k has the right partner
     x + n - 1 - k, and partners outside `inside` do not compete.
     """
     height, width = left.shape[0] - 2 * radius, left.shape[1] - 2 * radius

@@ -63,7 +63,7 @@ class SlowFill:
 
     def _from_beside(self, y: int, x: int, told: NDArray) -> float:
         beside = [
-            (abs(self.picture[v, x] - self.picture[y, x]).sum(), told[v, x])
+            (abs(self.picture[v, x] - self.picture[y, x]), told[v, x])
             for v in (y + 1, y - 1)
             if v < len(told)
             and self.classes[v, x] == self.classes[y, x]
@@ -85,7 +85,7 @@ class SlowFill:
                 continue
             if abs(d - layer) >= self.settings.layer_px + self.settings.layer_growth * abs(dx):
                 continue
-            colour = abs(self.picture[v, u] - self.picture[y, x]).sum()
+            colour = 3.0 * abs(self.picture[v, u] - self.picture[y, x])
             far = (math.hypot(dx, dy) - nearest) / (0.4 * self.radius)
             far += colour / self.settings.colour_scale
             weight = (0.05 + self.confidence[v, u]) * max(1.0 - far / 64.0, 0.3) ** 64

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from navapp.stereo import coarse, match_surface
-from navapp.stereo.coarse import are_swapped, find_near_clipped
+from navapp.stereo.coarse import are_swapped
 from tests.stereo.test_chains import (
     EVERY_RESOLUTION,
     FULL,
@@ -53,14 +53,3 @@ def test_pictures_that_agree_neither_way_are_not_called_swapped() -> None:
     for pair in (black, unrelated):
         assert not are_swapped(pair, FULL, swapped(pair))
         assert not are_swapped(swapped(pair), FULL, pair)
-
-
-def test_pixels_near_clipped_ones_are_those_whose_window_holds_one() -> None:
-    pair = scene(INSIDE)
-    left = np.minimum(pair.left, 250)
-    assert not find_near_clipped(replace(pair, left=left)).any()
-    left[INSIDE.y + 20, INSIDE.x + 30] = left[INSIDE.y - 1, INSIDE.x] = 255
-    found = find_near_clipped(replace(pair, left=left))
-    expected = np.zeros((INSIDE.height, INSIDE.width), dtype=np.bool_)
-    expected[14:27, 24:37] = True
-    np.testing.assert_array_equal(found, expected)

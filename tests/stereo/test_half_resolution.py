@@ -1,5 +1,7 @@
 """Half a pair's resolution, and back."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -16,7 +18,7 @@ def pair_of(width: int, height: int, box: Box) -> RectifiedPair:
 
 def test_a_pixel_of_the_half_is_the_mean_of_four() -> None:
     pair = pair_of(41, 31, Box(0, 0, 41, 31))
-    half = halve(pair)
+    half = halve(pair, (0.0, 9.0))
     four = pair.left[:30, :40].astype(float).reshape(15, 2, 20, 2).mean(axis=(1, 3))
     assert np.abs(half.left - four).max() <= 0.5
     assert half.right.shape == (15, 20)
@@ -24,7 +26,7 @@ def test_a_pixel_of_the_half_is_the_mean_of_four() -> None:
 
 def test_the_same_point_is_seen_at_the_matching_pixel_of_the_half() -> None:
     whole = pair_of(40, 30, Box(0, 0, 40, 30)).geometry
-    half = halve(pair_of(40, 30, Box(0, 0, 40, 30))).geometry
+    half = halve(pair_of(40, 30, Box(0, 0, 40, 30)), (0.0, 9.0)).geometry
     point = np.array([[12.0, -7.0, 450.0]])
     np.testing.assert_allclose(2.0 * half.project(point) + 0.5, whole.project(point), atol=1e-9)
     assert half.disparity_px(450.0) == pytest.approx(whole.disparity_px(450.0) / 2.0)
@@ -64,15 +66,16 @@ def test_unknown_pixels_do_not_spread() -> None:
     np.testing.assert_array_equal(found, expected)
 
 
-def test_with_a_band_only_what_the_box_reaches_is_made() -> None:
+def test_only_what_the_box_reaches_is_made() -> None:
     pair = pair_of(400, 90, Box(240, 20, 61, 31))
-    whole, part = halve(pair), halve(pair, (30.0, 60.0))
+    whole = halve(replace(pair, box=Box(0, 0, 400, 90)), (0.0, 30.0))
+    part = halve(pair, (15.0, 30.0))
     box = part.box
     rows = slice(box.y - 4, box.y + box.height + 4)
     columns = slice(box.x - 4, box.x + box.width + 4)
     np.testing.assert_array_equal(part.left[rows, columns], whole.left[rows, columns])
     reached = slice(box.x - 34, box.x + box.width - 11)
     np.testing.assert_array_equal(part.right[rows, reached], whole.right[rows, reached])
-    assert box == whole.box
+    assert box == half_box(pair.box)
     assert (part.left[:, :100] == 0).all()
     assert (part.right[:, :70] == 0).all()

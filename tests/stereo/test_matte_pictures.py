@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from navapp.geometry.box import Box
 from navapp.geometry.rectification import RectifiedPair
 from navapp.stereo import refine_on_model
-from navapp.stereo.matte_pictures import find_clipped, make_matte_pair
+from navapp.stereo.matte_pictures import find_clipped, find_near_clipped, make_matte_pair
 from tests.stereo.pairs import HEIGHT, WIDTH, shifted_pair
 
 BOX = Box(60, 20, 220, 80)
@@ -75,3 +75,12 @@ def test_clipped_specks_cost_little_of_what_is_answered() -> None:
 def test_grey_pictures_have_no_colour_to_go_by() -> None:
     grey = shifted_pair(np.full((HEIGHT, WIDTH), DISPARITY_PX), BOX)
     assert make_matte_pair(grey, ASKED) is None
+
+
+def test_pixels_near_clipped_ones_are_those_whose_window_holds_one() -> None:
+    picture = np.full((40, 60), 250, dtype=np.uint8)
+    assert not find_near_clipped(picture, 6).any()
+    picture[20, 30] = 255
+    expected = np.zeros(picture.shape, dtype=np.bool_)
+    expected[14:27, 24:37] = True
+    np.testing.assert_array_equal(find_near_clipped(picture, 6), expected)

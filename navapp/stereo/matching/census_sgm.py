@@ -17,7 +17,7 @@ from navapp.geometry.rectification import Image, RectifiedPair
 from navapp.stereo.matching.census_kernels import census_rows
 from navapp.stereo.matching.choice_kernels import Choice, choose_rows
 from navapp.stereo.matching.consistency_kernels import Demands, Evidence, judge_rows
-from navapp.stereo.matching.search import Crop, Search
+from navapp.stereo.matching.search import Search, contrast_grey, crop
 from navapp.stereo.matching.sgm_kernels import (
     MAX_PENALTY,
     NONE,
@@ -71,11 +71,9 @@ class CensusSettings:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TwoViewDisparity:
-    """What one aggregated cost says about both views."""
+class OtherView:
+    """What a fill asks besides the left map: the right view, and trust in the left one."""
 
-    # over the pair's box; only consistent pixels are matched, nothing is filled.
-    left: DisparityMap
     # (h, W) float32 disparity of the right view, whole pixels, NaN unknown; rows of the box.
     # Unchecked: what the right view prefers among the box's pixels.
     right_px: NDArray[np.float32]
@@ -83,6 +81,14 @@ class TwoViewDisparity:
     # (h, w) float32, 0 to 1, from uniqueness, texture and the agreement of the views; 0 where
     # unmatched.
     confidence: NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TwoViewDisparity(OtherView):
+    """What one aggregated cost says about both views."""
+
+    # over the pair's box; only consistent pixels are matched, nothing is filled.
+    left: DisparityMap
     # share of the pixels with contrast that are matched; tiny when the pictures are exchanged, NaN
     # when no pixel of either view has contrast.
     agreement: float
@@ -118,35 +124,35 @@ def match_census(
     search = Search.plan(pair, band_px)
     _check_volume(search, settings)
     if search.is_empty:
-        return _nothing(search)
+        return make_nothing(search)
     left, right = _views_of(pair, search, settings)
     left_px, right_px, uniqueness = _aggregate_and_choose(left, right, search, settings)
-    is_judged = np.empty(left_px.shape, dtype=np.bool_)
-    confidence = np.empty_like(left_px)
     evidence = Evidence(
         left_px, right_px, uniqueness, left.contrast_grey, right.contrast_grey, search.shift
     )
-    demands = _demands(settings)
-    judge = partial(judge_rows, evidence, demands, is_judged=is_judged, confidence=confidence)
-    in_row_bands(left_px.shape[0], judge)
-    # Smooth paths agree by chance too, but in specks.
-    is_matched = large_smooth_regions(left_px, settings.speckle_px, settings.max_difference_px)
-    np.copyto(left_px, np.float32(np.nan), where=~is_matched)
-    np.copyto(confidence, np.float32(0.0), where=~is_matched)
-    # Exchanged pictures give a tiny share.
-    n_judged = np.count_nonzero(is_judged)
-    n_agreeing = np.count_nonzero(is_matched & is_judged)
-    agreement = n_agreeing / n_judged if n_judged else float("nan")
-    return _result(search, settings, left_px, right_px, confidence, agreement)
-
-
-def _demands(settings: CensusSettings) -> Demands:
-    return Demands(
+    demands = Demands(
         settings.contrast_grey,
         np.float32(settings.full_contrast_grey),
         np.float32(settings.max_difference_px),
         np.float32(settings.min_uniqueness),
     )
+    is_judged, confidence = check_views(evidence, demands)
+    # Smooth paths agree by chance too, but in specks.
+    is_matched = large_smooth_regions(left_px, settings.speckle_px, settings.max_difference_px)
+    np.copyto(left_px, np.float32(np.nan), where=~is_matched)
+    np.copyto(confidence, np.float32(0.0), where=~is_matched)
+    return make_answer(search, settings.sigma_px, left_px, right_px, confidence, is_judged)
+
+
+def check_views(
+    evidence: Evidence, demands: Demands
+) -> tuple[NDArray[np.bool_], NDArray[np.float32]]:
+    """(h, w) whether a left pixel could be judged, and confidence; see `judge_rows`."""
+    is_judged = np.empty(evidence.left_px.shape, dtype=np.bool_)
+    confidence = np.empty_like(evidence.left_px)
+    judge = partial(judge_rows, evidence, demands, is_judged=is_judged, confidence=confidence)
+    in_row_bands(len(is_judged), judge)
+    return is_judged, confidence
 
 
 def _check_volume(search: Search, settings: CensusSettings) -> None:
@@ -165,10 +171,11 @@ def _views_of(pair: RectifiedPair, search: Search, settings: CensusSettings) -> 
     radius = (settings.radius_x, settings.radius_y)
     views, fills = [], []
     for image, box in ((pair.left, search.inside), (pair.right, search.right)):
-        crop = Crop.of(image, box, radius)
+        cropped = crop(image, box, radius)
         codes = np.empty((box.height, -(-settings.code_bits // 8), box.width), dtype=np.uint8)
-        fills.append(partial(census_rows, crop.values, *radius, (0, box.height), codes))
-        views.append(_View(np.ascontiguousarray(crop.inner), codes, crop.contrast_grey()))
+        fills.append(partial(census_rows, cropped, *radius, (0, box.height), codes))
+        grey = np.ascontiguousarray(image[box.slices])
+        views.append(_View(grey, codes, contrast_grey(cropped, radius)))
     run_both(*fills)
     return views[0], views[1]
 
@@ -222,40 +229,46 @@ def _views(left: _View, right: _View, search: Search, settings: CensusSettings) 
     )
 
 
-def _nothing(search: Search) -> TwoViewDisparity:
+def make_nothing(search: Search) -> TwoViewDisparity:
+    """The answer of a search without partners: all is unknown."""
     unknown = np.full((search.inside.height, search.inside.width), np.nan, dtype=np.float32)
     right_px = np.empty((search.inside.height, 0), dtype=np.float32)
-    return _result(search, CensusSettings(), unknown, right_px, np.zeros_like(unknown), np.nan)
+    is_judged = np.zeros(unknown.shape, dtype=np.bool_)
+    return make_answer(search, 0.0, unknown, right_px, np.zeros_like(unknown), is_judged)
 
 
-def _result(
+def make_answer(
     search: Search,
-    settings: CensusSettings,
+    sigma_px: float,
     left_px: NDArray[np.float32],
     right_px: NDArray[np.float32],
     confidence: NDArray[np.float32],
-    agreement: float,
+    is_judged: NDArray[np.bool_],
 ) -> TwoViewDisparity:
+    """What was found inside the pictures, laid into the whole box.
+
+    Args:
+        search: what was searched.
+        sigma_px: standard deviation that is claimed for every match.
+        left_px: (h, w) float32 of `search.inside`, NaN where unmatched.
+        right_px: (h, W) of `search.right`.
+        confidence: (h, w), 0 where unmatched.
+        is_judged: (h, w) of `check_views`.
+    """
     box, inside = search.box, search.inside
     right_rows = np.full((box.height, right_px.shape[1]), np.nan, dtype=np.float32)
     top = inside.y - box.y
     right_rows[top : top + inside.height] = right_px
+    whole = search.over_box(left_px, np.float32(np.nan))
+    # Unknown where the disparity is: NaN less NaN.
+    sigma = whole - whole + np.float32(sigma_px)
+    origin = np.isfinite(whole).astype(np.uint8) * np.uint8(Origin.MATCHED)
+    n_judged = np.count_nonzero(is_judged)
     return TwoViewDisparity(
-        make_matched_map(search, left_px, settings.sigma_px),
         right_rows,
         search.right.x,
         search.over_box(confidence, np.float32(0.0)),
-        agreement,
+        DisparityMap(whole, sigma, origin, box.x, box.y),
+        # Exchanged pictures give a tiny share. Only what was judged is matched.
+        np.count_nonzero(origin) / n_judged if n_judged else np.nan,
     )
-
-
-def make_matched_map(
-    search: Search, disparity_px: NDArray[np.float32], sigma_px: float
-) -> DisparityMap:
-    """The map over the whole box; (h, w) of its inside part, NaN where unmatched."""
-    whole = search.over_box(disparity_px.astype(np.float32, copy=False), np.float32(np.nan))
-    is_matched = np.isfinite(whole)
-    # Unknown where the disparity is: NaN less NaN.
-    sigma = whole - whole + np.float32(sigma_px)
-    origin = is_matched.astype(np.uint8) * np.uint8(Origin.MATCHED)
-    return DisparityMap(whole, sigma, origin, search.box.x, search.box.y)

@@ -1,6 +1,6 @@
 """Compiled comparison of the two views."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -32,30 +32,6 @@ def partner_column(x: int, shift: int, disparity_px: np.float32, right_width: in
     """Nearest whole column in the right view, the right one of two; -1 where there is none."""
     position = np.floor(x + (shift + 0.5) - np.float64(disparity_px))
     return int(position) if 0.0 <= position <= right_width - 1 else -1
-
-
-@njit(cache=True, nogil=True)
-def partner_values(
-    right_values: NDArray[Any],
-    disparity_px: NDArray[np.float32],
-    shift: int,
-    missing: Any,
-    values: NDArray[Any],
-) -> None:
-    """The right view's value at each left pixel's partner.
-
-    Args:
-        right_values: (h, W).
-        disparity_px: (h, w), NaN unknown.
-        shift: right column of the left column 0 at disparity 0.
-        missing: without a partner.
-        values: (h, w) in place.
-    """
-    height, width = disparity_px.shape
-    for y in range(height):
-        for x in range(width):
-            u = partner_column(x, shift, disparity_px[y, x], right_values.shape[1])
-            values[y, x] = right_values[y, u] if u >= 0 else missing
 
 
 @njit(cache=True, nogil=True)

@@ -77,43 +77,35 @@ class Search:
         return out
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Crop:
-    """A box of a picture with a margin around it; the picture's edge is repeated outside."""
+def crop(image: NDArray[T], box: Box, margin_px: tuple[int, int]) -> NDArray[T]:
+    """(h + 2 rows, w + 2 columns) a box of a picture, which it may leave, with a margin around it.
 
-    values: NDArray[Any]  # (h + 2 rows, w + 2 columns)
-    margin_px: tuple[int, int]  # columns and rows of the margin
+    Outside the picture its edge is repeated.
 
-    @classmethod
-    def of(cls, image: NDArray[Any], box: Box, margin_px: tuple[int, int]) -> "Crop":
-        """The box of a picture, which it may leave."""
-        import cv2
+    Args:
+        image: (H, W).
+        box: (h, w) of it.
+        margin_px: columns and rows of the margin.
+    """
+    import cv2
 
-        height, width = image.shape
-        rows, above, below = _inside(box.y - margin_px[1], box.height + 2 * margin_px[1], height)
-        columns, before, after = _inside(box.x - margin_px[0], box.width + 2 * margin_px[0], width)
-        part: Any = image[rows, columns]
-        grown: Any = cv2.copyMakeBorder(part, above, below, before, after, cv2.BORDER_REPLICATE)
-        return cls(np.asarray(grown, dtype=image.dtype), margin_px)
+    (beside, over), (height, width) = margin_px, image.shape
+    rows, above, below = _inside(box.y - over, box.height + 2 * over, height)
+    columns, before, after = _inside(box.x - beside, box.width + 2 * beside, width)
+    part: Any = image[rows, columns]
+    grown: Any = cv2.copyMakeBorder(part, above, below, before, after, cv2.BORDER_REPLICATE)
+    return np.asarray(grown, dtype=image.dtype)
 
-    @property
-    def inner(self) -> NDArray[Any]:
-        """(h, w) without the margin."""
-        return self._without_margin(self.values)
 
-    def contrast_grey(self) -> NDArray[np.uint8]:
-        """(h, w) range of grey levels in the window of the margin's size around each pixel."""
-        import cv2
+def contrast_grey(cropped: NDArray[np.uint8], margin_px: tuple[int, int]) -> NDArray[np.uint8]:
+    """(h, w) range of grey levels in the window of the margin's size around each pixel inside."""
+    import cv2
 
-        columns, rows = self.margin_px
-        window = np.ones((2 * rows + 1, 2 * columns + 1), dtype=np.uint8)
-        spread = cv2.subtract(cv2.dilate(self.values, window), cv2.erode(self.values, window))
-        return self._without_margin(np.asarray(spread)).astype(np.uint8)
-
-    def _without_margin(self, values: NDArray[Any]) -> NDArray[Any]:
-        columns, rows = self.margin_px
-        height, width = values.shape
-        return values[rows : height - rows, columns : width - columns]
+    columns, rows = margin_px
+    height, width = cropped.shape
+    window = np.ones((2 * rows + 1, 2 * columns + 1), dtype=np.uint8)
+    spread = cv2.subtract(cv2.dilate(cropped, window), cv2.erode(cropped, window))
+    return np.asarray(spread[rows : height - rows, columns : width - columns]).astype(np.uint8)
 
 
 def _inside(first: int, count: int, size: int) -> tuple[slice, int, int]:

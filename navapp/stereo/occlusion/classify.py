@@ -15,10 +15,9 @@ from navapp.geometry.bands import run_both
 from navapp.stereo.occlusion.classify_kernels import (
     class_rows,
     edge_splits,
-    find_agreed_ends,
+    find_begins,
     mark_seen,
     project_rows,
-    strip_ends,
 )
 from navapp.values import DisparityMap
 
@@ -28,18 +27,18 @@ def classify(
     right_px: NDArray[np.float32],
     right_x0: int,
     picture_width: int,
-    picture: NDArray[np.uint8] | None = None,
+    picture: NDArray[np.uint8],
 ) -> NDArray[np.uint8]:
     """Class of every pixel that is not, or not believably, matched.
 
     Args:
-        left: of the left view; for the right view see `mirrored`.
+        left: of the left view.
         right_px: (h, W) float32 disparity of the right view in the same rows, NaN where unknown.
         right_x0: column of its first pixel in the rectified right picture.
         picture_width: of the rectified pictures.
-        picture: (h, w) or (h, w, 3) rectified left picture over the map. With it, matches at the
-            left edge of near objects that look like the background are withdrawn: a matching
-            window hangs over the edge and gives the background the object's disparity.
+        picture: (h, w) rectified grey left picture over the map. Matches at the left edge of near
+            objects that look like the background are withdrawn: a matching window hangs over the
+            edge and gives the background the object's disparity.
 
     Returns:
         (h, w) 0 where the match stands and outside the picture, else the `Origin` that a filled
@@ -53,20 +52,17 @@ def classify(
     shape = left.disparity_px.shape
     if right_px.shape[0] != shape[0]:
         raise ValueError("classify needs both views over the same rows")
+    if picture.shape != shape:
+        raise ValueError("the picture must be grey and over the map's box")
     disparity = np.ascontiguousarray(left.disparity_px, dtype=np.float32)
     origin = np.ascontiguousarray(left.origin)
     right_px = np.ascontiguousarray(right_px, dtype=np.float32)
-    seen, ends = np.empty(shape, dtype=bool), np.empty(shape[0])
+    grey = np.ascontiguousarray(picture)
+    seen, begins = np.empty(shape, dtype=bool), np.empty(shape[0], dtype=np.int64)
     in_two_shares(lambda *rows: mark_seen(right_px, right_x0 - left.x, *rows, seen))
-    strip_ends(disparity, origin, left.x, ends)
-    begins = np.empty(shape[0], dtype=np.int64)
-    find_agreed_ends(ends, begins)
-    splits = np.empty((0, 0), dtype=np.int8)
-    if picture is not None:
-        channels = with_channels(picture, left)
-        splits = np.empty(shape, dtype=np.int8)
-        in_two_shares(lambda *rows: edge_splits(disparity, origin, begins, channels, *rows, splits))
-    classes = np.empty(shape, dtype=np.uint8)
+    find_begins(disparity, origin, left.x, begins)
+    splits, classes = np.empty(shape, dtype=np.int8), np.empty(shape, dtype=np.uint8)
+    in_two_shares(lambda *rows: edge_splits(disparity, origin, begins, grey, *rows, splits))
     in_two_shares(lambda *rows: class_rows(disparity, origin, begins, seen, splits, *rows, classes))
     classes[:, : max(-left.x, 0)] = 0
     classes[:, max(picture_width - left.x, 0) :] = 0
@@ -87,35 +83,6 @@ def project_to_right(
     right_px = np.empty((left_px.shape[0], picture_width), dtype=np.float32)
     in_two_shares(lambda *rows: project_rows(left_px, left_x, *rows, right_px))
     return right_px
-
-
-def mirrored(disparity_map: DisparityMap, picture_width: int) -> DisparityMap:
-    """The map seen in a mirror; a mirrored right view obeys the rules of a left one.
-
-    To treat the right view, mirror its map and flip its picture; the left view's disparity,
-    flipped, takes the part of `right_px`, with `picture_width - x - width` as its first column.
-    Mirroring twice gives the map back.
-    """
-    width = disparity_map.disparity_px.shape[1]
-    return DisparityMap(
-        np.ascontiguousarray(disparity_map.disparity_px[:, ::-1]),
-        np.ascontiguousarray(disparity_map.sigma_px[:, ::-1]),
-        np.ascontiguousarray(disparity_map.origin[:, ::-1]),
-        picture_width - disparity_map.x - width,
-        disparity_map.y,
-    )
-
-
-def with_channels(picture: NDArray[np.uint8], over: DisparityMap) -> NDArray[np.uint8]:
-    """The picture as (h, w, 1) or (h, w, 3), contiguous.
-
-    Raises:
-        ValueError: another size than the map's.
-    """
-    shape = over.disparity_px.shape
-    if picture.shape[:2] != shape or picture.shape[2:] not in ((), (3,)):
-        raise ValueError("the picture must be grey or have three channels over the map's box")
-    return np.ascontiguousarray(picture).reshape(*shape, -1)
 
 
 def in_two_shares(job: Callable[[int, int], object]) -> None:

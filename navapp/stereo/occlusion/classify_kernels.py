@@ -26,7 +26,7 @@ _JUMP_PX = 2.0
 _ZONE_PX = 3
 _SAMPLE_PX = 6
 _MIN_SAMPLES = 3
-# Colours differ enough at this sum of three channels; moving the edge costs this per pixel.
+# Pixels differ enough at this sum of three equal channels; moving the edge costs this per pixel.
 _LARGEST_COLOUR = 90
 _STAY = 20
 
@@ -58,23 +58,24 @@ def mark_seen(
 
 
 @njit(cache=True, nogil=True)
-def strip_ends(
+def find_begins(
     disparity: NDArray[np.float32],
     origin: NDArray[np.uint8],
     x0: int,
-    ends: NDArray[np.float64],
+    begins: NDArray[np.int64],
 ) -> None:
-    """Column where the strip without a right partner ends; NaN in rows without a run of matches.
+    """Column where the strip without a right partner ends, agreed with the rows around.
 
     Args:
         disparity: (h, w) px; read where matched.
         origin: (h, w) of the matches.
         x0: column of the map's first pixel in the rectified picture.
-        ends: (h,) in place.
+        begins: (h,) in place: whole column below the median of the rows' ends; 0 without a run of
+            matches nearby.
     """
     height, width = disparity.shape
+    ends, near = np.full(height, np.nan), np.empty(2 * _STRIP_ROWS + 1)
     for y in range(height):
-        ends[y] = np.nan
         run = 0
         for x in range(width):
             run = run + 1 if origin[y, x] == _MATCHED else 0
@@ -83,20 +84,13 @@ def strip_ends(
                 limit = disparity[y, end] + _STRIP_SLACK_PX - x0
                 ends[y] = max(min(float(end), limit), 0.0)
                 break
-
-
-@njit(cache=True, nogil=True)
-def find_agreed_ends(ends: NDArray[np.float64], agreed: NDArray[np.int64]) -> None:
-    """Whole column below the median of the known ends around each row; 0 without any."""
-    height = len(ends)
-    near = np.empty(2 * _STRIP_ROWS + 1)
     for y in range(height):
         n = 0
         for v in range(max(y - _STRIP_ROWS, 0), min(y + _STRIP_ROWS + 1, height)):
             if not np.isnan(ends[v]):
                 near[n] = ends[v]
                 n += 1
-        agreed[y] = int(np.median(near[:n])) if n > 0 else 0
+        begins[y] = int(np.median(near[:n])) if n > 0 else 0
 
 
 @njit(cache=True, nogil=True)
@@ -115,7 +109,7 @@ def edge_splits(
         disparity: (h, w) px; read where matched.
         origin: (h, w) of the matches.
         begins: (h,) first column whose matches count.
-        picture: (h, w, 1 or 3).
+        picture: (h, w) grey.
         first: row.
         step: between rows.
         splits: (h, w) in place: at the first pixel right of a jump; -1 elsewhere.
@@ -160,11 +154,8 @@ def _best_split(row: NDArray[np.uint8], x: int, samples: NDArray[np.int64]) -> i
 
 @njit(cache=True, nogil=True)
 def _difference(row: NDArray[np.uint8], u: int, v: int) -> int:
-    """Sum of three absolute colour differences; grey counts three times."""
-    total = np.int64(0)
-    for c in range(row.shape[1]):
-        total += abs(np.int64(row[u, c]) - np.int64(row[v, c]))
-    return int(total if row.shape[1] == 3 else 3 * total)
+    """Sum of the absolute differences of three equal channels."""
+    return int(3 * abs(np.int64(row[u]) - np.int64(row[v])))
 
 
 @njit(cache=True, nogil=True)
@@ -185,7 +176,7 @@ def class_rows(
         origin: (h, w) of the matches.
         begins: (h,) where the border strip ends.
         seen: (h, w) of `mark_seen`.
-        splits: (h, w) of `edge_splits`, or (0, 0): no match is withdrawn.
+        splits: (h, w) of `edge_splits`.
         first: row.
         step: between rows.
         classes: (h, w) in place; 0 where a match stands.
@@ -200,7 +191,7 @@ def class_rows(
                 row[x] = 0
             else:
                 row[x] = _MISMATCH if seen[y, x] else _INTERIOR
-        for x in range(begins[y], splits.shape[1]):
+        for x in range(begins[y], width):
             if splits[y, x] >= 0:
                 for u in range(x, min(x + _find_agreed_split(splits, y, x), width)):
                     row[u] = _INTERIOR if row[u] == 0 else row[u]
@@ -214,24 +205,13 @@ def _find_agreed_split(splits: NDArray[np.int8], y: int, x: int) -> int:
     One row alone is moved by noise: without another nearby nothing is split off.
     """
     height, width = splits.shape
-    n_of = np.zeros(_ZONE_PX + 1, np.int64)
-    n = 0
+    near, n = np.empty(25, np.int64), 0
     for v in range(max(y - 2, 0), min(y + 3, height)):
         for u in range(max(x - 2, 0), min(x + 3, width)):
             if splits[v, u] >= 0:
-                n_of[splits[v, u]] += 1
+                near[n] = splits[v, u]
                 n += 1
-    if n == 1:
-        return 0
-    lower = upper = -1
-    up_to = 0
-    for split in range(_ZONE_PX + 1):
-        up_to += n_of[split]
-        if lower < 0 and 2 * up_to >= n:
-            lower = split
-        if upper < 0 and 2 * up_to > n:
-            upper = split
-    return (lower + upper) // 2
+    return 0 if n == 1 else int(np.median(near[:n]))
 
 
 @njit(cache=True, nogil=True)

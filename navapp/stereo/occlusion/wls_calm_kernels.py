@@ -1,5 +1,7 @@
 """Compiled median of a filled map."""
 
+from typing import Any
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -33,14 +35,11 @@ def calm_rows(
         origin: (h, w) in place: the class where a pixel is filled.
     """
     height, width = told.shape
-    upright = np.full(width + 4, np.float32(np.nan))
+    upright, labels = np.full(width + 4, np.float32(np.nan)), np.zeros(width + 4, np.uint8)
     for y in range(first, height, step):
-        above, below = max(y - 1, 0), min(y + 1, height - 1)
-        _medians_of_rows(
-            told, scene.classes, (max(y - 2, 0), above, y, below, min(y + 2, height - 1)),
-            upright[2 : width + 2],
-        )  # fmt: skip
-        _medians_of_columns(upright, told[y], scene.classes[y], disparity[y])
+        _medians(_rows_around(told, y), _rows_around(scene.classes, y), upright[2 : width + 2])
+        labels[2 : width + 2], disparity[y] = scene.classes[y], told[y]
+        _medians(_shifted(upright), _shifted(labels), disparity[y])
         for x in range(width):
             label = scene.classes[y, x]
             filled = _UNKNOWN if np.isnan(told[y, x]) else label
@@ -48,44 +47,39 @@ def calm_rows(
 
 
 @njit(cache=True, nogil=True)
-def _medians_of_rows(
-    told: NDArray[np.float32],
-    classes: NDArray[np.uint8],
-    rows: tuple[int, int, int, int, int],
-    medians: NDArray[np.float32],
-) -> None:
-    ya, yb, y, yd, ye = rows
-    for x in range(len(medians)):
-        v, own = told[y, x], classes[y, x]
-        if own == 0:
-            # Nobody asks: a neighbour of another class has no say.
-            continue
-        a = _vote(told[ya, x], classes[ya, x] == own, v)
-        b = _vote(told[yb, x], classes[yb, x] == own, v)
-        d = _vote(told[yd, x], classes[yd, x] == own, v)
-        e = _vote(told[ye, x], classes[ye, x] == own, v)
-        medians[x] = _median(a, b, v, d, e)
+def _rows_around(plane: NDArray[Any], y: int) -> tuple[NDArray[Any], ...]:
+    """Row y of five in the middle; beyond the last row that again."""
+    last = len(plane) - 1
+    above, below = plane[max(y - 1, 0)], plane[min(y + 1, last)]
+    return plane[max(y - 2, 0)], above, plane[y], below, plane[min(y + 2, last)]
 
 
 @njit(cache=True, nogil=True)
-def _medians_of_columns(
-    upright: NDArray[np.float32],
-    told: NDArray[np.float32],
-    classes: NDArray[np.uint8],
-    calmed: NDArray[np.float32],
+def _shifted(row: NDArray[Any]) -> tuple[NDArray[Any], ...]:
+    """The row (w + 4,) from five places on, (w,) each: pixels beside each other."""
+    n = len(row)
+    return row[: n - 4], row[1 : n - 3], row[2 : n - 2], row[3 : n - 1], row[4:]
+
+
+@njit(cache=True, nogil=True)
+def _medians(
+    values: tuple[NDArray[np.float32], ...],
+    labels: tuple[NDArray[np.uint8], ...],
+    medians: NDArray[np.float32],
 ) -> None:
-    last = len(calmed) - 1
-    for x in range(len(calmed)):
-        own = classes[x]
+    """Medians (w,) of five, where the middle one is filled; those of its class vote."""
+    first, second, third, fourth, fifth = values
+    of_first, of_second, of_third, of_fourth, of_fifth = labels
+    for x in range(len(medians)):
+        v, own = third[x], of_third[x]
         if own == 0:
-            calmed[x] = told[x]
+            # Nobody asks: a neighbour of another class has no say.
             continue
-        v = upright[x + 2]
-        a = _vote(upright[x], classes[max(x - 2, 0)] == own, v)
-        b = _vote(upright[x + 1], classes[max(x - 1, 0)] == own, v)
-        d = _vote(upright[x + 3], classes[min(x + 1, last)] == own, v)
-        e = _vote(upright[x + 4], classes[min(x + 2, last)] == own, v)
-        calmed[x] = _median(a, b, v, d, e)
+        a = _vote(first[x], of_first[x] == own, v)
+        b = _vote(second[x], of_second[x] == own, v)
+        d = _vote(fourth[x], of_fourth[x] == own, v)
+        e = _vote(fifth[x], of_fifth[x] == own, v)
+        medians[x] = _median(a, b, v, d, e)
 
 
 @njit(cache=True, nogil=True)

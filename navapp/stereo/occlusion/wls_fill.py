@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from navapp.geometry.bands import run_both
 from navapp.geometry.masks import where
-from navapp.stereo.occlusion.classify import in_two_shares, with_channels
+from navapp.stereo.occlusion.classify import in_two_shares
 from navapp.stereo.occlusion.wls_calm_kernels import calm_rows
-from navapp.stereo.occlusion.wls_fill_kernels import between_rows, fit_rows
+from navapp.stereo.occlusion.wls_fill_kernels import fill_rows
 from navapp.stereo.occlusion.wls_fit_kernels import (
     N_TOLD_OF_A_PLACE,
     Rules,
@@ -45,7 +45,7 @@ class FillSettings:
     radius_px: int | None = None
     # a pixel further from its permitted neighbour stays unknown; None: the width of the map.
     max_gap_px: int | None = None
-    # sum of the three colour differences at which a pixel's weight is 1/e.
+    # sum of the differences of three equal channels at which a pixel's weight is 1/e.
     colour_scale: float = 18.0
     layer_px: float = 3.0  # support differs from the permitted neighbour by less than this ...
     layer_growth: float = 0.15  # ... and this per px of distance
@@ -81,8 +81,8 @@ def fill_gaps(
     """Disparity and origin (h, w) with classified pixels filled; the others keep all their bits.
 
     Args:
-        left: of the left view, or a mirrored one of the right view (`occlusion.classify.mirrored`).
-        picture: (h, w) or (h, w, 3) rectified picture over the map.
+        left: of the left view.
+        picture: (h, w) rectified grey picture over the map.
         confidence: (h, w) float32, 0 to 1, of the matches.
         classes: (h, w) of `occlusion.classify`.
         settings: of the fit.
@@ -97,13 +97,14 @@ def fill_gaps(
     """
     settings = settings or FillSettings()
     shape = left.disparity_px.shape
-    if confidence.shape != shape or classes.shape != shape:
-        raise ValueError("confidence and classes need the map's size")
+    if any(given.shape != shape for given in (picture, confidence, classes)):
+        raise ValueError("picture (grey), confidence and classes need the map's size")
     scene = Scene(
         disparity=np.ascontiguousarray(left.disparity_px, dtype=np.float32),
         origin=np.ascontiguousarray(left.origin),
         classes=np.ascontiguousarray(classes),
-        picture=with_channels(picture, left),
+        is_support=(left.origin == Origin.MATCHED) & (classes == 0),
+        picture=np.ascontiguousarray(picture),
         confidence=np.ascontiguousarray(confidence, dtype=np.float32),
     )
     told = _fit_all(scene, settings)
@@ -133,8 +134,12 @@ def _fit_all(scene: Scene, settings: FillSettings) -> NDArray[np.float32]:
     told = np.empty((height, width), dtype=np.float32)
     shared = (scene, support, rules)
     in_two_shares(lambda *rows: list_support(scene, rules.stride, *rows, support))
-    run_both(partial(fit_rows, *shared, 0, 4, told), partial(fit_rows, *shared, 2, 4, told))
-    run_both(partial(between_rows, *shared, 1, 4, told), partial(between_rows, *shared, 3, 4, told))
+    # Even rows, then the odd ones between them.
+    for first in (0, 1):
+        run_both(
+            partial(fill_rows, *shared, first, 4, told),
+            partial(fill_rows, *shared, first + 2, 4, told),
+        )
     return told
 
 
@@ -143,8 +148,7 @@ def _rules(scene: Scene, settings: FillSettings) -> Rules:
     if radius is None:
         # A part of the pixels tells the spread as well as all.
         part = np.s_[::_SPREAD_STEP, ::_SPREAD_STEP]
-        is_support = (scene.origin[part] == int(Origin.MATCHED)) & (scene.classes[part] == 0)
-        radius = support_radius_px(scene.disparity[part][is_support])
+        radius = support_radius_px(scene.disparity[part][scene.is_support[part]])
     return Rules(
         radius=radius,
         rows=round(_ROWS_PER_RADIUS * radius),

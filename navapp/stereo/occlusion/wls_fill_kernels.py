@@ -12,7 +12,6 @@ from navapp.stereo.occlusion.wls_fit_kernels import (
     Rules,
     Scene,
     Support,
-    find_support,
     fit,
     nearest,
 )
@@ -26,54 +25,30 @@ _SAME_PX = np.float32(1.0)
 
 
 @njit(cache=True, nogil=True)
-def fit_rows(
+def fill_rows(
     scene: Scene, support: Support, rules: Rules, first: int, step: int, told: NDArray[np.float32]
 ) -> None:
-    """Fill rows `first`, `first + step`, ... by fits.
+    """Fill rows `first`, `first + step`, ...: even ones by fits, odd ones as those beside them.
+
+    An odd row is told what the even ones above and below say, and fitted where neither tells.
 
     Args:
         scene: what is filled.
         support: of it.
         rules: of the fit.
-        first: row.
-        step: between rows.
+        first: row. Odd rows need the even ones beside them filled.
+        step: between rows, even.
         told: (h, w) in place: the disparity where nothing is to be filled, the told value
             elsewhere; NaN where nothing may speak.
-    """
-    width = told.shape[1]
-    on_left, on_right = np.empty(width, np.int32), np.empty(width, np.int32)
-    fitted, state = np.empty(width, np.int32), np.empty(N_STATE, np.float32)
-    is_support = np.empty(width, np.bool_)
-    for y in range(first, told.shape[0], step):
-        find_support(scene.origin[y], scene.classes[y], is_support)
-        _speakers(is_support, scene.classes[y], rules.max_gap, on_left, on_right)
-        _keep_matches(scene.disparity[y], scene.classes[y], told[y])
-        _fill_runs(scene, support, rules, y, on_left, on_right, fitted, state, told[y])
-
-
-@njit(cache=True, nogil=True)
-def between_rows(
-    scene: Scene, support: Support, rules: Rules, first: int, step: int, told: NDArray[np.float32]
-) -> None:
-    """Fill rows between two filled ones: as above, as below, by a fit where neither tells.
-
-    Args:
-        scene: what is filled.
-        support: of it.
-        rules: of the fit.
-        first: row; those beside it are filled already.
-        step: between rows.
-        told: (h, w) in place, as of `fit_rows`.
     """
     height, width = told.shape
     on_left, on_right = np.empty(width, np.int32), np.empty(width, np.int32)
     fitted, state = np.empty(width, np.int32), np.empty(N_STATE, np.float32)
-    is_support = np.empty(width, np.bool_)
     for y in range(first, height, step):
-        find_support(scene.origin[y], scene.classes[y], is_support)
-        _speakers(is_support, scene.classes[y], rules.max_gap, on_left, on_right)
+        _speakers(scene.is_support[y], scene.classes[y], rules.max_gap, on_left, on_right)
         _keep_matches(scene.disparity[y], scene.classes[y], told[y])
-        _from_beside(scene, y, min(y + 1, height - 1), on_left, on_right, told)
+        if y % 2 == 1:
+            _from_beside(scene, y, min(y + 1, height - 1), on_left, on_right, told)
         _fill_runs(scene, support, rules, y, on_left, on_right, fitted, state, told[y])
 
 
@@ -118,10 +93,8 @@ def _from_beside(
         elif abs(upper - lower) < _SAME_PX:
             own[x] = np.float32(0.5) * (upper + lower)
         else:
-            up = down = np.int64(0)
-            for c in range(picture.shape[1]):
-                up += abs(np.int64(picture[x, c]) - np.int64(above_picture[x, c]))
-                down += abs(np.int64(picture[x, c]) - np.int64(below_picture[x, c]))
+            up = abs(np.int64(picture[x]) - np.int64(above_picture[x]))
+            down = abs(np.int64(picture[x]) - np.int64(below_picture[x]))
             own[x] = upper if up < down else lower
 
 

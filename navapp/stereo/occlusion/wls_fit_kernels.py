@@ -6,22 +6,20 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-# Of `values.Origin`, as a number for compiled code.
-_MATCHED = 1
 # Even a match without confidence tells something.
 _LEAST_TRUST = np.float32(0.05)
 # A fitted slope may lead this far beyond what was measured.
 _BEYOND_PX = np.float32(1.0)
 
-# A place of the support: column, disparity, trust, three channels.
-N_TOLD_OF_A_PLACE = 6
+# A place of the support: column, disparity, trust, grey value.
+N_TOLD_OF_A_PLACE = 4
 # That many pixels are fitted together. What belongs to each of them stands side by side in one
 # array: where it is, what may speak for it, its normal equations, its support's range, the result.
 _LANES = 8
-_X, _LAYER, _NEAR, _FROM, _TO, _RED, _GREEN, _BLUE = (_LANES * k for k in range(8))
-_SW, _SX, _SY, _SXX, _SXY, _SYY = (_LANES * k for k in range(8, 14))
-_SD, _SDX, _SDY, _LOW, _HIGH, _TOLD = (_LANES * k for k in range(14, 20))
-N_STATE = 20 * _LANES
+_X, _LAYER, _NEAR, _FROM, _TO, _GREY = (_LANES * k for k in range(6))
+_SW, _SX, _SY, _SXX, _SXY, _SYY = (_LANES * k for k in range(6, 12))
+_SD, _SDX, _SDY, _LOW, _HIGH, _TOLD = (_LANES * k for k in range(12, 18))
+N_STATE = 18 * _LANES
 _NOTHING = np.float32(1e9)
 
 
@@ -31,7 +29,8 @@ class Scene(NamedTuple):
     disparity: NDArray[np.float32]  # (h, w) px; read where matched
     origin: NDArray[np.uint8]  # (h, w) of the matches
     classes: NDArray[np.uint8]  # (h, w) of `occlusion.classify`
-    picture: NDArray[np.uint8]  # (h, w, 1 or 3)
+    is_support: NDArray[np.bool_]  # (h, w) matches that stand
+    picture: NDArray[np.uint8]  # (h, w) grey
     confidence: NDArray[np.float32]  # (h, w)
 
 
@@ -52,7 +51,7 @@ class Rules(NamedTuple):
 class Support(NamedTuple):
     """The pixels that are asked, in every `stride`-th row."""
 
-    # (h / stride, w, 6) ascending in the column, as many as `counts` says.
+    # (h / stride, w, 4) ascending in the column, as many as `counts` says.
     places: NDArray[np.float32]
     counts: NDArray[np.int32]  # (h / stride, w + 1) how many of them are left of a column
 
@@ -69,12 +68,10 @@ def list_support(scene: Scene, stride: int, first: int, step: int, support: Supp
         support: in place.
     """
     width = scene.origin.shape[1]
-    last_channel = scene.picture.shape[2] - 1
-    is_support = np.empty(width, np.bool_)
     for row in range(first, support.counts.shape[0], step):
         y, n, run = row * stride, 0, 0
-        find_support(scene.origin[y], scene.classes[y], is_support)
-        confidence, disparity, picture = scene.confidence[y], scene.disparity[y], scene.picture[y]
+        is_support, picture = scene.is_support[y], scene.picture[y]
+        confidence, disparity = scene.confidence[y], scene.disparity[y]
         places, counts = support.places[row], support.counts[row]
         for x in range(width):
             counts[x] = n
@@ -84,20 +81,10 @@ def list_support(scene: Scene, stride: int, first: int, step: int, support: Supp
             if run % stride == 0:
                 trust = confidence[x] if confidence[x] > 0.0 else np.float32(0.0)
                 places[n, 0], places[n, 1], places[n, 2] = x, disparity[x], trust + _LEAST_TRUST
-                for c in range(3):
-                    places[n, 3 + c] = picture[x, min(c, last_channel)]
+                places[n, 3] = picture[x]
                 n += 1
             run += 1
         counts[width] = n
-
-
-@njit(cache=True, nogil=True)
-def find_support(
-    origin: NDArray[np.uint8], classes: NDArray[np.uint8], is_support: NDArray[np.bool_]
-) -> None:
-    """Which pixels of a row are matched and stand."""
-    for x in range(len(origin)):
-        is_support[x] = (origin[x] == _MATCHED) & (classes[x] == 0)
 
 
 @njit(cache=True, nogil=True)
@@ -151,7 +138,7 @@ def _start(
 
     A pixel's layer is that of the farther of those who speak.
     """
-    width, last_channel = len(disparity), picture.shape[1] - 1
+    width = len(disparity)
     state[:] = 0.0
     begin, end, n = width, -1, 0
     while n < min(_LANES, len(fitted)):
@@ -166,9 +153,7 @@ def _start(
         state[_X + n], state[_LAYER + n] = x, disparity[farther]
         state[_FROM + n], state[_TO + n] = from_column, to_column
         state[_NEAR + n] = np.float32(nearest(x, left, right)) * rules.per_px
-        state[_RED + n] = picture[x, 0]
-        state[_GREEN + n] = picture[x, min(1, last_channel)]
-        state[_BLUE + n] = picture[x, last_channel]
+        state[_GREY + n] = picture[x]
         state[_LOW + n], state[_HIGH + n] = _NOTHING, -_NOTHING
         n += 1
     return n, begin, end
@@ -189,20 +174,15 @@ def _add_row(
     float32 can hold.
     """
     zero, one, part = np.float32(0.0), np.float32(1.0), np.float32(1.0 / 64.0)
-    least = np.float32(0.3)
+    least, three = np.float32(0.3), np.float32(3.0)
     per_colour, per_px = rules.per_colour, rules.per_px
     layer_px, layer_growth = rules.layer_px, rules.layer_growth
     for i in range(among[0], among[1]):
-        u, value, trust = places[i, 0], places[i, 1], places[i, 2]
-        red, green, blue = places[i, 3], places[i, 4], places[i, 5]
+        u, value, trust, grey = places[i, 0], places[i, 1], places[i, 2], places[i, 3]
         for k in range(_LANES):
             dx = u - state[_X + k]
             d = value - state[_LAYER + k]
-            colour = (
-                abs(red - state[_RED + k])
-                + abs(green - state[_GREEN + k])
-                + abs(blue - state[_BLUE + k])
-            )
+            colour = three * abs(grey - state[_GREY + k])
             far = per_colour * colour + per_px * np.sqrt(dx * dx + dy * dy) - state[_NEAR + k]
             w = one - part * far
             w = w if w > least else least

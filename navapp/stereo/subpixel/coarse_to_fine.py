@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from navapp.geometry.rectification import RectifiedPair
 from navapp.stereo.subpixel.highlights import without_highlights
-from navapp.stereo.subpixel.refine import RefineSettings, refine, refine_samples
+from navapp.stereo.subpixel.refine import RefineSettings, refine
 from navapp.stereo.subpixel.regional import RegionalSettings, regional_support
 from navapp.values import DisparityMap
 
@@ -45,7 +45,7 @@ def refine_surface(pair: RectifiedPair, coarse_px: NDArray[np.float32]) -> Dispa
     """
     support = coarse_px
     for _ in range(_N_TURNS):
-        samples = refine_samples(pair, support, _FAIR, _SURFACE.thin)
+        samples = refine(pair, support, _FAIR, _SURFACE.thin)
         surface = regional_support(samples.disparity_px, _weights(samples), support.shape, _SURFACE)
         with np.errstate(invalid="ignore"):
             is_same = np.abs(surface - coarse_px) < _FAR_PX

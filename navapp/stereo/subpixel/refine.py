@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.bands import in_row_bands
+from navapp.geometry.box import Box
 from navapp.geometry.masks import large_smooth_regions
-from navapp.geometry.rectification import RectifiedPair
+from navapp.geometry.rectification import RectifiedPair, find_reached
 from navapp.geometry.zbuffer import find_known_range
 from navapp.stereo.subpixel.refine_kernels import (
     CORRELATION,
@@ -26,8 +27,6 @@ from navapp.stereo.subpixel.refine_kernels import (
 )
 from navapp.values import DisparityMap
 
-# What the steps and the interpolation need on either side.
-_SPARE_COLUMNS = 8
 # Of the support, to see where it lies.
 _SAMPLE_PX = 4
 _LEAST_CONFIRMED = 0.1
@@ -59,7 +58,10 @@ MODEL_REFINEMENT = RefineSettings(systematic_px=0.08)
 
 
 def refine(
-    pair: RectifiedPair, support_px: NDArray[np.float32], settings: RefineSettings | None = None
+    pair: RectifiedPair,
+    support_px: NDArray[np.float32],
+    settings: RefineSettings | None = None,
+    stride_px: int = 1,
 ) -> DisparityMap:
     """Measure the disparity near a support.
 
@@ -68,9 +70,11 @@ def refine(
         support_px: (h, w) float32 disparity over the box, NaN where nothing is expected; within
             about half a pixel a step of the truth.
         settings: of the refinement.
+        stride_px: only every so many-th pixel each way is measured.
 
     Returns:
-        The map over `pair.box`; pixels that did not settle, correlate or show texture are unknown.
+        The map over `pair.box`, of the measured pixels only; those that did not settle, correlate
+        or show texture are unknown.
 
     Raises:
         ValueError: colour pictures, a support of another size than the box, or a box that reaches
@@ -79,43 +83,7 @@ def refine(
     Source: inverse-compositional image correlation (Pan et al. 2013) with gain and offset, on the
     model's own surface instead of a plane.
     """
-    return _accept(pair, support_px, settings or RefineSettings(), 1)
-
-
-def refine_samples(
-    pair: RectifiedPair,
-    support_px: NDArray[np.float32],
-    settings: RefineSettings,
-    stride_px: int,
-) -> DisparityMap:
-    """As `refine`, but only every `stride_px`-th pixel each way; the map holds only those."""
-    return _accept(pair, support_px, settings, stride_px)
-
-
-def refine_on_model(pair: RectifiedPair, support_px: NDArray[np.float32]) -> DisparityMap:
-    """As `refine`, on a model's own surface: nothing where hardly anything confirms it.
-
-    Chance and repeated texture confirm a few per cent of any support, in specks.
-    """
-    found = without_specks(refine(pair, support_px, MODEL_REFINEMENT))
-    n_expected = np.count_nonzero(np.isfinite(support_px))
-    if found.n_matched < _LEAST_CONFIRMED * n_expected:
-        return found.only(np.zeros(support_px.shape, dtype=np.bool_))
-    return found
-
-
-def without_specks(found: DisparityMap) -> DisparityMap:
-    """The map without small patches that stand alone."""
-    return found.only(large_smooth_regions(found.disparity_px, _SPECKLE_PX2, _SPECKLE_STEP_PX))
-
-
-def _accept(
-    pair: RectifiedPair,
-    support_px: NDArray[np.float32],
-    settings: RefineSettings,
-    stride_px: int,
-) -> DisparityMap:
-    """Every window that is good enough."""
+    settings = settings or RefineSettings()
     box = pair.box
     if pair.left.ndim != 2 or support_px.shape != (box.height, box.width):
         raise ValueError("refine needs grey pictures and a support of the box's size")
@@ -141,6 +109,23 @@ def _accept(
     return DisparityMap(disparity, sigma, origin, box.x, box.y)
 
 
+def refine_on_model(pair: RectifiedPair, support_px: NDArray[np.float32]) -> DisparityMap:
+    """As `refine`, on a model's own surface: nothing where hardly anything confirms it.
+
+    Chance and repeated texture confirm a few per cent of any support, in specks.
+    """
+    found = without_specks(refine(pair, support_px, MODEL_REFINEMENT))
+    n_expected = np.count_nonzero(np.isfinite(support_px))
+    if found.n_matched < _LEAST_CONFIRMED * n_expected:
+        return found.only(np.zeros(support_px.shape, dtype=np.bool_))
+    return found
+
+
+def without_specks(found: DisparityMap) -> DisparityMap:
+    """The map without small patches that stand alone."""
+    return found.only(large_smooth_regions(found.disparity_px, _SPECKLE_PX2, _SPECKLE_STEP_PX))
+
+
 def _steps(
     pair: RectifiedPair,
     support: NDArray[np.float32],
@@ -149,13 +134,12 @@ def _steps(
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """(h, w) offset px from the support, and (h, w, 4) / stride what the last step says of it."""
     box = pair.box
-    rows = slice(box.y, box.y + box.height)
-    columns = _find_reached_columns(support, box.x, pair.right.shape[1])
-    seen = pair.left[rows, box.x : box.x + box.width]
+    columns = _find_reached_columns(support, box, pair.right.shape[1])
+    seen = pair.left[box.slices]
     # About a middle value, the products of float32 keep their digits.
     centre = np.float32(seen[::_SAMPLE_PX, ::_SAMPLE_PX].mean() if seen.size else 0.0)
     left = np.subtract(seen, centre, dtype=np.float32)
-    right = np.subtract(pair.right[rows, columns], centre, dtype=np.float32)
+    right = np.subtract(pair.right[box.slices[0], columns], centre, dtype=np.float32)
     radius, offset, refined = settings.radius_px, np.zeros_like(support), np.empty_like(support)
     least = settings.min_filled * (2 * radius + 1) ** 2
     height, width = (-(-length // stride_px) for length in support.shape)
@@ -189,13 +173,10 @@ def _is_at_rest(quality: NDArray[np.float32], settings: RefineSettings) -> bool:
     return bool(2 * np.count_nonzero(is_small) >= len(step))
 
 
-def _find_reached_columns(
-    support: NDArray[np.float32], first_column: int, picture_width: int
-) -> slice:
+def _find_reached_columns(support: NDArray[np.float32], box: Box, picture_width: int) -> slice:
     """Columns of the right picture that some pixel's window can ask for."""
     farthest, nearest = find_known_range(support)
     if farthest > nearest:
         return slice(0, 0)
-    first = int(first_column - nearest) - _SPARE_COLUMNS
-    last = int(first_column + support.shape[1] - farthest) + _SPARE_COLUMNS
-    return slice(min(max(first, 0), picture_width), max(min(last, picture_width), 0))
+    _, reached = find_reached(box, (farthest, nearest))
+    return reached.clip(picture_width, box.y + box.height).slices[1]

@@ -5,24 +5,22 @@ from numba import njit
 from numpy.typing import NDArray
 
 from navapp.geometry.lane_kernels import FLOAT_LANES
-from navapp.stereo.subpixel.window_step_kernels import (
+from navapp.stereo.subpixel.window_kernels import (
+    N_SOLVED,
     SOLVED_CORRELATION,
     SOLVED_NEW,
     SOLVED_SPREAD,
     SOLVED_STEP,
     SOLVED_VARIANCE,
-    solve_windows,
-    take_roots,
-    thin_out,
-)
-from navapp.stereo.subpixel.window_sum_kernels import (
-    N_SOLVED,
     Planes,
     add_up,
     close_block,
     enter_row,
     make_planes,
     sample_row,
+    solve_windows,
+    take_roots,
+    thin_out,
 )
 
 # What is known of a window after a step.

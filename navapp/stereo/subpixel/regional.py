@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from navapp.geometry.bands import in_row_bands
 from navapp.geometry.lane_kernels import FLOAT_LANES, lanes_for
-from navapp.stereo.subpixel.regional_kernels import Rules, fit_rows
+from navapp.stereo.subpixel.regional_kernels import Rules, Samples, Window, fit_rows
 from navapp.stereo.subpixel.regional_picture_kernels import picture_rows
-from navapp.stereo.subpixel.regional_sample_kernels import Samples, Window, place_rows
 
 _TAPER = 1.5
 # For each known sample: on 1, u, v, u^2, uv, v^2. A polynomial that hangs on few samples may
@@ -47,7 +46,7 @@ def regional_support(
     samples_px: NDArray[np.float32],
     weights: NDArray[np.float32],
     shape: tuple[int, int],
-    settings: RegionalSettings | None = None,
+    settings: RegionalSettings,
 ) -> NDArray[np.float32]:
     """Robust locally weighted quadratics around the nodes of a grid, blended into one surface.
 
@@ -69,7 +68,6 @@ def regional_support(
     polynomial's residuals being its own. It begins at a median and the scale falls, so near a step
     it takes the side that most samples are on.
     """
-    settings = settings or RegionalSettings()
     expected = tuple(-(-size // settings.thin) for size in shape)
     if samples_px.shape != expected or weights.shape != expected:
         raise ValueError("samples and weights need the size of the map, thinned")
@@ -77,13 +75,9 @@ def regional_support(
     n_rows, n_columns = ((size - 1) // side + 2 for size in shape)
     nodes = np.empty((n_rows, 7, lanes_for(n_columns, FLOAT_LANES)), dtype=np.float32)
     samples = _samples(samples_px, weights, nodes.shape, settings)
-    window, rules = _window(samples, settings), _rules(settings)
-    in_row_bands(
-        n_rows * side,
-        lambda rows: fit_rows(
-            samples, window, rules, -(-rows[0] // side), -(-rows[1] // side), nodes
-        ),
-    )
+    window, scales = _window(samples, settings), np.array(settings.scales_px, dtype=np.float32)
+    rules = Rules(scales, _RIDGE, np.float32(settings.min_samples))
+    in_row_bands(n_rows, lambda rows: fit_rows(samples, window, rules, *rows, nodes), every=1)
     picture = np.empty(shape, dtype=np.float32)
     unit = np.float32(side / settings.radius_px)
     in_row_bands(shape[0], lambda rows: picture_rows(nodes, side, unit, *rows, picture))
@@ -100,15 +94,17 @@ def _samples(
     spacing, reach = settings.node_px // settings.thin, settings.radius_px // settings.thin
     margin = -(-reach // spacing)
     stride = nodes[2] + 2 * margin
-    size = (spacing * (nodes[0] - 1) + 2 * reach + 1) * spacing * stride
-    values, known = np.zeros((2, size), dtype=np.float32)
-    samples = Samples(values, known, spacing * stride, stride, spacing, reach, margin)
-    place_rows(
-        np.ascontiguousarray(samples_px, dtype=np.float32),
-        np.ascontiguousarray(weights, dtype=np.float32),
-        0, len(samples_px), samples,
-    )  # fmt: skip
-    return samples
+    planes = np.zeros(
+        (2, spacing * (nodes[0] - 1) + 2 * reach + 1, spacing, stride), dtype=np.float32
+    )
+    is_known = (weights > 0.0) & np.isfinite(samples_px)
+    for plane, given in zip(planes, (samples_px, weights), strict=True):
+        kept = np.where(is_known, given, np.float32(0.0))
+        for phase in range(spacing):
+            part = kept[:, phase::spacing]
+            plane[reach : reach + len(part), phase, margin : margin + part.shape[1]] = part
+    values, known = planes.reshape(2, -1)
+    return Samples(values, known, spacing * stride, stride, spacing, reach, margin)
 
 
 def _window(samples: Samples, settings: RegionalSettings) -> Window:
@@ -118,8 +114,3 @@ def _window(samples: Samples, settings: RegionalSettings) -> Window:
     taps = np.unique(np.round(np.linspace(0, 2 * samples.reach, _N_START)).astype(int))
     start = (taps[:, None] * samples.width + across[taps]).ravel()
     return Window(across, u, np.exp(-np.float32(_TAPER) * u * u), start)
-
-
-def _rules(settings: RegionalSettings) -> Rules:
-    scales = np.array(settings.scales_px, dtype=np.float32)
-    return Rules(scales, _RIDGE, np.float32(settings.min_samples))

@@ -1,4 +1,9 @@
-"""Compiled robust quadratics around the nodes of a grid, eight neighbouring nodes at once."""
+"""Compiled robust quadratics around the nodes of a grid, eight neighbouring nodes at once.
+
+Samples lie in planes: row y + reach holds row y of the samples, its columns sorted by their place
+between two nodes. So what eight nodes read of a row is contiguous, and a margin without weight
+spares every test for the border.
+"""
 
 from typing import Any, NamedTuple
 
@@ -6,8 +11,15 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from navapp.geometry.lane_kernels import FLOAT_LANES, load, spread, store, where_positive
-from navapp.stereo.subpixel.regional_sample_kernels import Samples, Window, count_known, medians
+from navapp.geometry.lane_kernels import (
+    FLOAT_LANES,
+    larger,
+    load,
+    smaller,
+    spread,
+    store,
+    where_positive,
+)
 
 # 1, u, v, u^2, uv, v^2.
 _N_TERMS = 6
@@ -21,6 +33,28 @@ _RIGHT = _MOMENTS + _N_POWERS * _N_POWERS
 _BELOW = _RIGHT + _N_RIGHT_POWERS * _N_RIGHT_POWERS
 _SCALED = _BELOW + (_N_TERMS + 1) * _N_TERMS
 _N_STATE = _SCALED + (_N_TERMS + 1) * _N_TERMS
+
+
+class Samples(NamedTuple):
+    """What is fitted."""
+
+    values: NDArray[np.float32]  # (rows * width,) px
+    weights: NDArray[np.float32]  # the same size, 0 where nothing is known
+    width: int  # elements from row to row
+    stride: int  # elements from place to place between two nodes
+    spacing: int  # samples from node to node, each way
+    reach: int  # rows above the first sample
+    margin: int  # elements before the first sample of each place
+
+
+class Window(NamedTuple):
+    """What a node sees; element k is the sample k - reach, each way."""
+
+    across: NDArray[np.intp]  # (n,) places in a row of the planes, of the first node
+    offsets: NDArray[np.float32]  # (n,) distance in window radii
+    taper: NDArray[np.float32]  # (n,) weight by that
+    # places in the planes of the samples that the first polynomial is the median of.
+    start: NDArray[np.intp]
 
 
 class Rules(NamedTuple):
@@ -59,14 +93,76 @@ def fit_rows(
     for j in range(first, last):
         for i in range(0, n_columns, FLOAT_LANES):
             begin = j * samples.spacing * samples.width + i
-            count_known(samples, window, begin, counts)
+            _count_known(samples, window, begin, counts)
             if counts.max() >= rules.min_samples:
                 state[: _N_TERMS * FLOAT_LANES] = np.float32(0.0)
-                medians(samples, window, begin, ranked, state)
+                _medians(samples, window, begin, ranked, state)
                 for scale in rules.scales_px:
                     _add_window(samples, window, begin, scale, state)
                     _solve(rules.ridge, counts, state)
             _tell(state, counts, rules.min_samples, n_columns, told[7 * j * n_columns + i :])
+
+
+@njit(cache=True, nogil=True)
+def _count_known(samples: Samples, window: Window, begin: int, counts: NDArray[np.float32]) -> None:
+    """Known samples in the windows of eight nodes, from the place `begin` on."""
+    one, zero = spread(np.float32(1.0)), spread(np.float32(0.0))
+    count = zero
+    for j in range(len(window.across)):
+        for place in window.across:
+            weight = load(samples.weights, begin + j * samples.width + place)
+            count = count + where_positive(weight, one, zero)
+    store(counts, 0, count)
+
+
+@njit(cache=True, nogil=True)
+def _medians(
+    samples: Samples,
+    window: Window,
+    begin: int,
+    ranked: NDArray[np.float32],
+    found: NDArray[np.float32],
+) -> None:
+    """Medians of some samples around eight nodes; 0 without any."""
+    one, zero = spread(np.float32(1.0)), spread(np.float32(0.0))
+    nothing = spread(np.float32(np.inf))
+    count = zero
+    for k in range(len(window.start)):
+        weight = load(samples.weights, begin + window.start[k])
+        value = load(samples.values, begin + window.start[k])
+        store(ranked, k * FLOAT_LANES, where_positive(weight, value, nothing))
+        count = count + where_positive(weight, one, zero)
+    _sort(ranked)
+    store(found, 0, count)
+    for k in range(FLOAT_LANES):
+        n = int(found[k])
+        low, high = ranked[(max(n, 1) - 1) // 2 * FLOAT_LANES + k], ranked[n // 2 * FLOAT_LANES + k]
+        found[k] = np.float32(0.5) * (low + high) if n > 0 else np.float32(0.0)
+
+
+@njit(cache=True, nogil=True)
+def _sort(ranked: NDArray[np.float32]) -> None:
+    """Sort every lane.
+
+    Source: Batcher's merge exchange, Knuth, The Art of Computer Programming 3, algorithm 5.2.2M.
+    """
+    n = len(ranked) // FLOAT_LANES
+    largest = 1
+    while 2 * largest < n:
+        largest *= 2
+    p = largest
+    while p > 0:
+        q, r, d = largest, 0, p
+        while True:
+            for i in range(n - d):
+                if i & p == r:
+                    low, high = load(ranked, i * FLOAT_LANES), load(ranked, (i + d) * FLOAT_LANES)
+                    store(ranked, i * FLOAT_LANES, smaller(low, high))
+                    store(ranked, (i + d) * FLOAT_LANES, larger(low, high))
+            if q == p:
+                break
+            d, q, r = q - p, q // 2, p
+        p //= 2
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -60,26 +60,14 @@ def _across(
     below = np.float32(step)
     v, w = below * unit, (below - np.float32(1.0)) * unit
     a, b = np.float32(1.0) - below + _LEAST_SHARE, below + _LEAST_SHARE
-    lines[:] = 0.0
-    _add_two(top[0], bottom[0], a, b, lines[0])
-    _add_two(top[1], bottom[1], a, b, lines[1])
-    _add_two(top[3], bottom[3], a * v, b * w, lines[1])
-    _add_two(top[6], bottom[6], a * v * v, b * w * w, lines[1])
-    _add_two(top[2], bottom[2], a, b, lines[2])
-    _add_two(top[5], bottom[5], a * v, b * w, lines[2])
-    _add_two(top[4], bottom[4], a, b, lines[3])
-
-
-@njit(cache=True, nogil=True)
-def _add_two(
-    one: NDArray[np.float32],
-    other: NDArray[np.float32],
-    a: np.float32,
-    b: np.float32,
-    out: NDArray[np.float32],
-) -> None:
-    for i in range(len(out)):
-        out[i] += a * one[i] + b * other[i]
+    av, bw, avv, bww = a * v, b * w, a * v * v, b * w * w
+    for i in range(lines.shape[1]):
+        lines[0, i] = a * top[0, i] + b * bottom[0, i]
+        of_v = a * top[1, i] + b * bottom[1, i] + (av * top[3, i] + bw * bottom[3, i])
+        lines[1, i] = of_v + (avv * top[6, i] + bww * bottom[6, i])
+        of_uv = av * top[5, i] + bw * bottom[5, i]
+        lines[2, i] = a * top[2, i] + b * bottom[2, i] + of_uv
+        lines[3, i] = a * top[4, i] + b * bottom[4, i]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.transform import RigidTransform
 from navapp.stereo import refine_on_model
-from navapp.stereo.matte_pictures import find_filled, make_matte_pair
+from navapp.stereo.matte_pictures import RESAMPLED_REACH_PX, find_near_clipped, make_matte_pair
 from navapp.tracking.following import Follower
 from navapp.tracking.frame import Fit, Frame
 from navapp.tracking.surface_meter import (
@@ -63,7 +63,7 @@ class HighlightSearch:
         if matte is None:
             return
         # What was filled was not measured.
-        is_filled = find_filled(coloured.left)
+        is_filled = find_near_clipped(coloured.left, RESAMPLED_REACH_PX)
         first = self._measure_matte(expected, matte, is_filled)
         if first is None:
             return

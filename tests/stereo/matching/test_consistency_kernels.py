@@ -7,7 +7,7 @@ from navapp.stereo.matching.consistency_kernels import (
     Demands,
     Evidence,
     judge_rows,
-    partner_values,
+    partner_column,
 )
 from tests.reference import consistency_reference as reference
 
@@ -47,11 +47,18 @@ def test_matches_are_judged_as_the_definition_says(shift, least_contrast) -> Non
     assert expected_matched.any() == (shift < 40)
 
 
-@pytest.mark.kernel
-@pytest.mark.parametrize("shift", [-6, 0, 3])
-def test_partners_are_found_as_the_definition_says(shift) -> None:
-    seen = evidence(shift)
-    found = np.empty_like(seen.left_px)
-    partner_values(seen.right_px, seen.left_px, shift, np.float32(-9.0), found)
-    expected = reference.at_partner(seen.right_px, seen.left_px, shift, -9.0)
-    assert np.array_equal(found, expected, equal_nan=True)
+@pytest.mark.parametrize(
+    ("disparity", "column"),
+    [(2.0, 3), (2.4, 3), (2.5, 3), (2.51, 2), (1.51, 3), (1.5, 4), (5.6, -1), (np.nan, -1)],
+)
+def test_the_partner_is_the_nearest_whole_column_and_the_right_one_of_two(
+    disparity, column
+) -> None:
+    assert partner_column(5, 0, np.float32(disparity), 10) == column
+
+
+def test_a_shift_moves_the_partner_and_outside_is_none() -> None:
+    one = np.float32(1.0)
+    assert [partner_column(x, 3, one, 4) for x in range(4)] == [2, 3, -1, -1]
+    assert [partner_column(x, -1, one, 4) for x in range(4)] == [-1, -1, 0, 1]
+    assert partner_column(1, 0, one, 0) == -1

@@ -5,13 +5,9 @@ import pytest
 
 from navapp.geometry.box import Box
 from navapp.geometry.rectification import RectifiedPair
-from navapp.stereo.matching.gradient import (
-    GradientSettings,
-    magnitude,
-    match_gradient,
-    smooth_known,
-)
-from navapp.stereo.matching.gradient_kernels import match_rows
+from navapp.stereo.matching import gradient
+from navapp.stereo.matching.gradient import find_winners, magnitude, match_gradient, smooth_known
+from navapp.stereo.matching.search import Search
 from navapp.values import Origin
 from tests.reference.gradient_reference import match
 from tests.stereo.pairs import HEIGHT, WIDTH, geometry, shifted_pair
@@ -19,24 +15,29 @@ from tests.stereo.pairs import HEIGHT, WIDTH, geometry, shifted_pair
 INNER = Box(90, 20, 180, 80)
 
 
-@pytest.mark.kernel
-@pytest.mark.parametrize("inside", [(0, 21), (4, 17)])
-def test_the_kernel_agrees_with_the_equations(inside) -> None:
-    rng = np.random.default_rng(3)
-    radius, n, height, width = 2, 6, 9, 16
-    left = rng.integers(0, 900, (height + 2 * radius, width + 2 * radius), dtype=np.int32)
-    right = rng.integers(0, 900, (height + 2 * radius, width + 2 * radius + n - 1), dtype=np.int32)
-    right[:, 3 : 3 + left.shape[1]] = left
-    expected_left, expected_right = match(left, right, radius, n, inside)
-    found_left = np.full((height, width), -9, dtype=np.int32)
-    found_right = np.full((height, width + n - 1), -9, dtype=np.int32)
-    mirrored = np.ascontiguousarray(right[:, ::-1])
-    mirrored_inside = (width + n - 1 - inside[1], width + n - 1 - inside[0])
-    for rows in ((0, 4), (4, height)):
-        match_rows(left, mirrored, mirrored_inside, rows, found_left, found_right)
-    assert (found_left == expected_left).all()
-    assert (found_right[:, ::-1] == expected_right).all()
-    assert (found_left[:, 4:12] == 2).all()
+@pytest.mark.parametrize("box", [Box(20, 8, 16, 9), Box(3, 1, 14, 7), Box(30, 18, 10, 6)])
+def test_the_winners_are_those_of_the_equations(box) -> None:
+    left = np.random.default_rng(3).integers(0, 256, (24, 40), dtype=np.uint8)
+    pair = RectifiedPair(left, np.roll(left, -4, axis=1), geometry(40, 24), box)
+    search = Search.plan(pair, (3.0, 6.0))
+    radius, n, beyond = 5, search.count, 20
+    # Of all partners, also those outside the picture, with a margin.
+    first = box.x - (search.lowest + n - 1)
+    parts = []
+    for picture, x, width in ((left, box.x, box.width), (pair.right, first, box.width + n - 1)):
+        padded = np.pad(magnitude(picture).astype(np.int64), beyond, mode="edge")
+        rows, columns = padded[box.y - radius + beyond :], slice(x - radius + beyond, None)
+        parts.append(rows[: box.height + 2 * radius, columns][:, : width + 2 * radius])
+    inside = search.right.x - first, search.right.x + search.right.width - first
+    best_left, best_right = match(*parts, radius, n, inside)
+    best_right = best_right[:, slice(*inside)]
+    is_minimum = (best_left > 0) & (best_left < n - 1)
+    found_left, found_right = find_winners(pair, search)
+    expected = np.where(is_minimum, best_left + search.lowest, np.nan)
+    np.testing.assert_array_equal(found_left, expected)
+    expected = np.where(best_right >= 0, best_right + search.lowest, np.nan)
+    np.testing.assert_array_equal(found_right, expected)
+    assert (found_left == 4.0).mean() > 0.4
 
 
 def test_the_magnitude_is_that_of_the_slope() -> None:
@@ -111,12 +112,10 @@ def test_bad_input_is_refused() -> None:
     pair = shifted_pair(np.full((HEIGHT, WIDTH), 20.0), INNER, is_colour=True)
     with pytest.raises(ValueError, match="grey"):
         match_gradient(pair, (10.0, 40.0))
-    with pytest.raises(ValueError, match="odd"):
-        GradientSettings(window_px=10)
 
 
 @pytest.mark.data
-def test_the_baseline_on_a_real_scene_is_what_the_paper_builds_on(data) -> None:
+def test_the_baseline_on_a_real_scene_is_what_the_paper_builds_on(data, monkeypatch) -> None:
     import cv2
 
     folder = data / "stereo" / "cones"
@@ -124,7 +123,8 @@ def test_the_baseline_on_a_real_scene_is_what_the_paper_builds_on(data) -> None:
     truth = cv2.imread(str(folder / "disp2.png"), 0) / 4.0
     height, width = left.shape
     pair = RectifiedPair(left, right, geometry(width, height), Box(0, 0, width, height))
-    found = match_gradient(pair, (0.0, 63.0), GradientSettings(window_px=9)).left
+    monkeypatch.setattr(gradient, "_RADIUS_PX", 4)
+    found = match_gradient(pair, (0.0, 63.0)).left
     is_known = (truth > 0.0) & np.isfinite(found.disparity_px)
     assert is_known.sum() > 0.8 * (truth > 0.0).sum()
     assert (np.abs(found.disparity_px - truth)[is_known] > 1.0).mean() < 0.12

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from navapp.geometry.box import Box
-from navapp.stereo.matching.search import Crop
+from navapp.stereo.matching.search import crop
 
 PICTURE = np.random.default_rng(2).integers(0, 255, (20, 30)).astype(np.uint8)
 
@@ -25,6 +25,6 @@ def test_beyond_the_picture_its_edge_is_repeated(box: Box, margin: tuple[int, in
     rows = np.arange(box.y - margin[1], box.y + box.height + margin[1]).clip(0, 19)
     columns = np.arange(box.x - margin[0], box.x + box.width + margin[0]).clip(0, 29)
     for picture in (PICTURE, PICTURE.astype(np.float32)):
-        found = Crop.of(picture, box, margin).values
+        found = crop(picture, box, margin)
         np.testing.assert_array_equal(found, picture[np.ix_(rows, columns)])
         assert found.flags.c_contiguous

@@ -7,7 +7,7 @@ import pytest
 
 from navapp.stereo.occlusion import classify as occlusion
 from navapp.stereo.occlusion import wls_fill
-from navapp.stereo.occlusion.classify import classify, mirrored
+from navapp.stereo.occlusion.classify import classify
 from navapp.stereo.occlusion.wls_fill import FillSettings, fill_wls, support_radius_px
 from navapp.values import DisparityMap, Origin
 from tests.bench.stereo_pairs import ALOE, CONES, Known, added_by_fill, matched
@@ -21,12 +21,14 @@ from tests.stereo.occlusion.test_classify import (
     WIDTH,
     as_map,
     found_views,
+    mirrored,
     true_views,
+    without_edges,
 )
 
 
 def picture_of(columns: slice) -> np.ndarray:
-    picture = np.random.default_rng(2).integers(55, 65, (HEIGHT, WIDTH, 3)).astype(np.uint8)
+    picture = np.random.default_rng(2).integers(55, 65, (HEIGHT, WIDTH)).astype(np.uint8)
     picture[ROWS, columns] = 200
     return picture
 
@@ -38,14 +40,14 @@ def sure() -> np.ndarray:
 def filled_left() -> tuple[DisparityMap, DisparityMap]:
     """The left view before and after."""
     before = as_map(found_views()[0])
-    classes = classify(before, true_views()[1].astype(np.float32), 0, WIDTH)
+    classes = classify(before, true_views()[1].astype(np.float32), 0, WIDTH, without_edges())
     return before, fill_wls(before, picture_of(LEFT_COLUMNS), sure(), classes)
 
 
 def filled_right() -> DisparityMap:
     before = mirrored(as_map(found_views()[1]), WIDTH)
     other = np.ascontiguousarray(true_views()[0][:, ::-1].astype(np.float32))
-    classes = classify(before, other, 0, WIDTH)
+    classes = classify(before, other, 0, WIDTH, without_edges())
     picture = np.ascontiguousarray(picture_of(RIGHT_COLUMNS)[:, ::-1])
     return mirrored(fill_wls(before, picture, sure(), classes), WIDTH)
 
@@ -131,7 +133,7 @@ def test_nothing_beyond_the_permitted_sides_range_is_invented(seed: int) -> None
     disparity = 20.0 + 0.5 * np.arange(80) + rng.normal(0.0, 0.4, (30, 80))
     gap = slice(35, 55)
     disparity[:, gap] = np.nan
-    picture = rng.integers(0, 256, (30, 80, 3)).astype(np.uint8)
+    picture = rng.integers(0, 256, (30, 80)).astype(np.uint8)
     classes = np.zeros((30, 80), dtype=np.uint8)
     classes[:, gap] = Origin.FILLED_INTERIOR
     confidence = rng.random((30, 80)).astype(np.float32)
@@ -175,16 +177,6 @@ def test_the_order_of_the_shares_does_not_matter(monkeypatch: pytest.MonkeyPatch
     _, one_by_one = filled_left()
     assert one_by_one.disparity_px.tobytes() == side_by_side.disparity_px.tobytes()
     assert one_by_one.origin.tobytes() == side_by_side.origin.tobytes()
-
-
-def test_grey_counts_as_three_equal_channels() -> None:
-    before, gap = three_parts()
-    grey = np.random.default_rng(1).integers(0, 90, gap.shape).astype(np.uint8)
-    classes = np.where(gap, Origin.FILLED_INTERIOR, 0).astype(np.uint8)
-    sure_here = np.ones(gap.shape, np.float32)
-    in_grey = fill_wls(before, grey, sure_here, classes)
-    in_colour = fill_wls(before, np.repeat(grey[:, :, None], 3, axis=2), sure_here, classes)
-    np.testing.assert_array_equal(in_grey.disparity_px, in_colour.disparity_px)
 
 
 def test_a_jagged_edge_lets_nobody_from_the_forbidden_side_speak() -> None:
@@ -255,7 +247,7 @@ def test_the_result_is_that_of_the_slow_reference(seed: int) -> None:
     disparity[rng.random(shape) < 0.1] = np.nan
     disparity[:, 20:26] = np.nan
     before = as_map(disparity, x=40)
-    picture = rng.integers(0, 256, (*shape, 3)).astype(np.uint8)
+    picture = rng.integers(0, 256, shape).astype(np.uint8)
     confidence = rng.random(shape).astype(np.float32)
     labels = rng.integers(Origin.FILLED_BORDER, Origin.MISMATCH_FILLED + 1, shape)
     withdrawn = rng.random(shape) < 0.05

@@ -8,7 +8,7 @@ from navapp.geometry.bands import in_row_bands
 from navapp.geometry.box import Box
 from navapp.geometry.rectification import RectifiedPair
 from navapp.stereo.subpixel import refine as module
-from navapp.stereo.subpixel.refine import RefineSettings, refine, refine_samples
+from navapp.stereo.subpixel.refine import RefineSettings, refine
 from navapp.stereo.subpixel.refine_kernels import refine_rows
 from tests.reference.refine_reference import refine_step
 from tests.stereo.pairs import geometry
@@ -166,7 +166,7 @@ def test_the_kernel_agrees_with_the_readable_reference(case: str) -> None:
 def test_with_a_stride_the_same_windows_answer_the_same(stride: int) -> None:
     pair, support = pair_with(SLANT), in_box(SLANT + 0.2)
     every = refine(pair, support, RefineSettings(n_steps=1, last_step_px=0.5))
-    thin = refine_samples(pair, support, RefineSettings(n_steps=1, last_step_px=0.5), stride)
+    thin = refine(pair, support, RefineSettings(n_steps=1, last_step_px=0.5), stride)
     found, expected = thin.disparity_px, every.disparity_px[::stride, ::stride]
     # Float sums depend on the row that a band begins with.
     np.testing.assert_allclose(found, expected, atol=1e-4)
@@ -178,7 +178,7 @@ def test_samples_at_rest_take_no_further_step(
 ) -> None:
     bands = bands_of(monkeypatch)
     settings = RefineSettings(n_steps=3, stops_at_rest=True, last_step_px=0.3)
-    found = refine_samples(pair_with(SLANT), in_box(SLANT + off_px), settings, 6)
+    found = refine(pair_with(SLANT), in_box(SLANT + off_px), settings, 6)
     # The picture's rows are shared by two bands.
     assert len(bands) == 2 * n_steps
     assert abs(np.nanmedian(found.disparity_px - in_box(SLANT)[::6, ::6])) < 0.03
@@ -193,7 +193,7 @@ def test_every_thread_begins_at_a_row_of_samples(
     height = 20 * stride
     grey = np.full((height, WIDTH), 100, dtype=np.uint8)
     pair = RectifiedPair(grey, grey, geometry(), Box(60, 0, 70, height))
-    refine_samples(pair, np.full((height, 70), 2.0, np.float32), RefineSettings(n_steps=1), stride)
+    refine(pair, np.full((height, 70), 2.0, np.float32), RefineSettings(n_steps=1), stride)
     assert len(bands) == 2
     assert all(first % stride == 0 for first, _ in bands)
 

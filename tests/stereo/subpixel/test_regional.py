@@ -142,7 +142,7 @@ def test_the_row_bands_do_not_matter(monkeypatch: pytest.MonkeyPatch) -> None:
     disparity[30:80, 20:90] = np.nan
     found = surface(disparity)
 
-    def in_bands(n_bands: int, height: int, job) -> None:
+    def in_bands(n_bands: int, height: int, job, **_: int) -> None:
         limits = [height * k // n_bands for k in range(n_bands + 1)]
         for band in pairwise(limits):
             job(band)
@@ -174,9 +174,9 @@ def test_too_few_samples_have_no_surface() -> None:
 def test_what_makes_no_sense_is_refused() -> None:
     samples = np.ones((75, 85), dtype=np.float32)
     with pytest.raises(ValueError, match="size"):
-        regional_support(samples, samples[:3], SMOOTH.shape)
+        regional_support(samples, samples[:3], SMOOTH.shape, RegionalSettings())
     with pytest.raises(ValueError, match="size"):
-        regional_support(samples, samples, (75, 85))
+        regional_support(samples, samples, (75, 85), RegionalSettings())
     with pytest.raises(ValueError, match="divides"):
         RegionalSettings(node_px=8, thin=3)
     with pytest.raises(ValueError, match="radius"):

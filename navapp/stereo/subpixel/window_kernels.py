@@ -1,4 +1,4 @@
-"""Compiled sums over square windows of a row: what one Gauss-Newton step of a disparity needs.
+"""Compiled sums over the square windows of a row, and one Gauss-Newton step of their disparity.
 
 Values lie in planes, one kind after the other, so that eight neighbours are added at once. Sums
 never take anything away again: float32 keeps their digits however many rows there are.
@@ -10,20 +10,32 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from navapp.geometry.lane_kernels import FLOAT_LANES, load, spread, store
+from navapp.geometry.lane_kernels import (
+    FLOAT_LANES,
+    larger,
+    load,
+    smaller,
+    spread,
+    store,
+    where_positive,
+)
 
 # Window sums: number of pixels; left, right, gradient; their products; gradient^2 times the
 # offset and its square.
-SUM_N, SUM_L, SUM_R, SUM_G, SUM_LL, SUM_RR, SUM_GG, SUM_LR, SUM_LG, SUM_RG, SUM_O, SUM_OO = range(
-    12
-)
-N_SUMS = 12
+_SUM_N, _SUM_L, _SUM_R, _SUM_G, _SUM_LL, _SUM_RR, _SUM_GG = range(7)
+_SUM_LR, _SUM_LG, _SUM_RG, _SUM_O, _SUM_OO = range(7, 12)
+_N_SUMS = 12
 # Of one row: left, offset, whether the partner is known, four neighbours there and the place
 # between the middle ones.
 _LEFT, _OFFSET, _KNOWN, _P0, _P1, _P2, _P3, _T = range(8)
 _N_SAMPLES = 8
-# Kinds of what is solved for a row of windows (`window_step_kernels`).
 N_SOLVED = 7
+# Of a row of windows: 1 where there is support; step, correlation (at first without its divisor),
+# new offset. The last three await their square roots.
+_SUPPORTED, SOLVED_STEP, SOLVED_CORRELATION, SOLVED_NEW, SOLVED_VARIANCE, _LL_RR, SOLVED_SPREAD = (
+    range(N_SOLVED)
+)
+_LARGEST_STEP_PX = np.float32(0.5)
 _NOTHING = np.float32(0.0)
 
 
@@ -51,10 +63,10 @@ def make_planes(width: int, radius: int) -> Planes:
         pitch,
         wide_pitch,
         np.zeros(_N_SAMPLES * pitch, dtype=np.float32),
-        np.zeros((2 * radius + 1) * N_SUMS * pitch, dtype=np.float32),
-        np.zeros(N_SUMS * pitch, dtype=np.float32),
-        np.zeros(N_SUMS * wide_pitch, dtype=np.float32),
-        np.zeros(N_SUMS * pitch, dtype=np.float32),
+        np.zeros((2 * radius + 1) * _N_SUMS * pitch, dtype=np.float32),
+        np.zeros(_N_SUMS * pitch, dtype=np.float32),
+        np.zeros(_N_SUMS * wide_pitch, dtype=np.float32),
+        np.zeros(_N_SUMS * pitch, dtype=np.float32),
         np.zeros(N_SOLVED * pitch, dtype=np.float32),
     )
 
@@ -129,24 +141,24 @@ def enter_row(planes: Planes, place: int, span: tuple[int, int]) -> None:
         known, o = load(samples, _KNOWN * pitch + x), load(samples, _OFFSET * pitch + x)
         value = known * load(samples, _LEFT * pitch + x)
         gg = g * g
-        _enter(planes, place, SUM_N, x, known)
-        _enter(planes, place, SUM_L, x, value)
-        _enter(planes, place, SUM_R, x, r)
-        _enter(planes, place, SUM_G, x, g)
-        _enter(planes, place, SUM_LL, x, value * value)
-        _enter(planes, place, SUM_RR, x, r * r)
-        _enter(planes, place, SUM_GG, x, gg)
-        _enter(planes, place, SUM_LR, x, value * r)
-        _enter(planes, place, SUM_LG, x, value * g)
-        _enter(planes, place, SUM_RG, x, r * g)
-        _enter(planes, place, SUM_O, x, gg * o)
-        _enter(planes, place, SUM_OO, x, gg * o * o)
+        _enter(planes, place, _SUM_N, x, known)
+        _enter(planes, place, _SUM_L, x, value)
+        _enter(planes, place, _SUM_R, x, r)
+        _enter(planes, place, _SUM_G, x, g)
+        _enter(planes, place, _SUM_LL, x, value * value)
+        _enter(planes, place, _SUM_RR, x, r * r)
+        _enter(planes, place, _SUM_GG, x, gg)
+        _enter(planes, place, _SUM_LR, x, value * r)
+        _enter(planes, place, _SUM_LG, x, value * g)
+        _enter(planes, place, _SUM_RG, x, r * g)
+        _enter(planes, place, _SUM_O, x, gg * o)
+        _enter(planes, place, _SUM_OO, x, gg * o * o)
 
 
 @njit(cache=True, nogil=True)
 def _enter(planes: Planes, place: int, term: int, x: int, value: Any) -> None:
     at = term * planes.pitch + x
-    store(planes.ring, place * N_SUMS * planes.pitch + at, value)
+    store(planes.ring, place * _N_SUMS * planes.pitch + at, value)
     store(planes.block, at, load(planes.block, at) + value)
 
 
@@ -159,9 +171,9 @@ def close_block(planes: Planes, size: int, span: tuple[int, int]) -> None:
         size: rows of the ring.
         span: first pixel that was entered, and after the last.
     """
-    pitch, length = planes.pitch, N_SUMS * planes.pitch
+    pitch, length = planes.pitch, _N_SUMS * planes.pitch
     for place in range(size - 2, -1, -1):
-        for term in range(N_SUMS):
+        for term in range(_N_SUMS):
             begin = place * length + term * pitch
             for at in range(begin + span[0], begin + span[1], FLOAT_LANES):
                 store(planes.ring, at, load(planes.ring, at) + load(planes.ring, at + length))
@@ -182,8 +194,8 @@ def add_up(planes: Planes, place: int, radius: int, span: tuple[int, int]) -> No
     low, high = max(span[0] - margin, 0), min(span[1] + margin, planes.pitch)
     pitch, wide, columns = planes.pitch, planes.wide_pitch, planes.columns
     # The older rows of the windows end the block before, unless the block is all of them.
-    older = (place + 1) * N_SUMS * pitch
-    for term in range(N_SUMS):
+    older = (place + 1) * _N_SUMS * pitch
+    for term in range(_N_SUMS):
         middle = term * (wide - pitch) + radius
         for at in range(term * pitch + low, term * pitch + high, FLOAT_LANES):
             value = load(planes.block, at)
@@ -196,3 +208,94 @@ def add_up(planes: Planes, place: int, radius: int, span: tuple[int, int]) -> No
             for k in range(at + 1, at + 2 * radius + 1, 2):
                 value = value + (load(columns, k) + load(columns, k + 1))
             store(planes.sums, term * pitch + x, value)
+
+
+@njit(cache=True, nogil=True)
+def thin_out(planes: Planes, support: NDArray[np.float32], stride: int) -> None:
+    """Only every `stride`-th window of the sums, and whether it has support.
+
+    Args:
+        planes: sums and solved in place.
+        support: (w,) disparity px of the row.
+        stride: px.
+    """
+    supported = planes.solved.reshape(N_SOLVED, -1)[_SUPPORTED]
+    count = (support.shape[0] + stride - 1) // stride
+    for x in range(count):
+        supported[x] = not np.isnan(support[x * stride])
+    if stride > 1:
+        for plane in planes.sums.reshape(_N_SUMS, -1):
+            for x in range(count):
+                plane[x] = plane[x * stride]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def solve_windows(planes: Planes, span: tuple[int, int], least: np.float32) -> None:
+    """Gain and disparity step of each window.
+
+    Minimises sum (l - b (r - g e))^2 over the gain b and the step e, all mean-free: a difference in
+    brightness or contrast between the cameras does not move the answer.
+
+    Args:
+        planes: sums are read; solved in place.
+        span: first window, a multiple of the lanes, and after the last.
+        least: number of pixels that a window needs.
+    """
+    pitch, sums, solved = planes.pitch, planes.sums, planes.solved
+    zero, one, unknown = spread(_NOTHING), spread(np.float32(1.0)), spread(np.float32(np.nan))
+    for x in range(span[0], span[1], FLOAT_LANES):
+        n, s_l, s_r = load(sums, x), load(sums, _SUM_L * pitch + x), load(sums, _SUM_R * pitch + x)
+        s_g, weight = load(sums, _SUM_G * pitch + x), load(sums, _SUM_GG * pitch + x)
+        per_n = one / larger(n, one)
+        mean_l, mean_r = s_l * per_n, s_r * per_n
+        ll = load(sums, _SUM_LL * pitch + x) - mean_l * s_l
+        rr = load(sums, _SUM_RR * pitch + x) - mean_r * s_r
+        gg = weight - s_g * per_n * s_g
+        lr = load(sums, _SUM_LR * pitch + x) - mean_l * s_r
+        lg = load(sums, _SUM_LG * pitch + x) - mean_l * s_g
+        rg = load(sums, _SUM_RG * pitch + x) - mean_r * s_g
+        determinant = rr * gg - rg * rg
+        per_determinant = one / determinant
+        gain = (lr * gg - lg * rg) * per_determinant
+        gain_step = (lr * rg - lg * rr) * per_determinant
+        thousandth = spread(np.float32(1e-3))
+        answers = load(solved, _SUPPORTED * pitch + x)
+        answers = where_positive(spread(least) - n, zero, answers)
+        answers = where_positive(thousandth * n - smaller(ll, rr), zero, answers)
+        answers = where_positive(spread(np.float32(1e-4)) * n - gg, zero, answers)
+        answers = where_positive(thousandth * rr * gg - determinant, zero, answers)
+        # What is not a number is not positive: it does not answer.
+        answers = where_positive(gain - spread(np.float32(0.2)), answers, zero)
+        answers = where_positive(spread(np.float32(5.0)) - gain, answers, zero)
+        step = gain_step / gain
+        residual = larger(ll - gain * lr + gain_step * lg, zero)
+        freedom = larger(n - spread(np.float32(3.0)), one)
+        per_weight = one / weight
+        mean = load(sums, _SUM_O * pitch + x) * per_weight
+        rough = load(sums, _SUM_OO * pitch + x) * per_weight - mean * mean
+        mean = where_positive(weight - thousandth, mean, zero)
+        most = spread(_LARGEST_STEP_PX)
+        bounded = smaller(larger(step, zero - most), most)
+        variance = residual * rr * per_determinant / (freedom * gain * gain)
+        store(solved, SOLVED_NEW * pitch + x, mean + where_positive(answers, bounded, zero))
+        store(solved, SOLVED_STEP * pitch + x, where_positive(answers, step, unknown))
+        store(solved, SOLVED_VARIANCE * pitch + x, where_positive(answers, variance, unknown))
+        store(
+            solved, SOLVED_SPREAD * pitch + x, where_positive(answers, larger(rough, zero), unknown)
+        )
+        store(solved, SOLVED_CORRELATION * pitch + x, where_positive(answers, lr, zero))
+        store(solved, _LL_RR * pitch + x, where_positive(answers, ll * rr, one))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def take_roots(planes: Planes, span: tuple[int, int]) -> None:
+    """Square roots of what was solved: loops over one array, so that the compiler makes vectors."""
+    first, after = span
+    solved = planes.solved.reshape(N_SOLVED, -1)
+    for index in (SOLVED_VARIANCE, SOLVED_SPREAD, _LL_RR):
+        plane = solved[index]
+        for x in range(first, after):
+            plane[x] = np.sqrt(plane[x])
+    correlation, divisor = solved[SOLVED_CORRELATION], solved[_LL_RR]
+    for x in range(first, after):
+        correlation[x] /= divisor[x]
