@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from navapp.geometry.box import Box
 from navapp.geometry.halves import double, half_box, inside_of_halves, mean_blocks
-from navapp.geometry.masks import where
+from navapp.geometry.masks import grow, where
 from navapp.geometry.rectification import Image, RectifiedPair, find_reached
 from navapp.geometry.resampling import TAPS_PX
 from navapp.stereo.matching.census_sgm import (
@@ -132,12 +132,10 @@ def clip_box(pair: RectifiedPair) -> RectifiedPair:
 
 def smooth_steps(coarse_px: NDArray[np.float32]) -> NDArray[np.float32]:
     """A matched map (h, w) of whole disparities as a smooth surface, single holes closed."""
-    import cv2
-
     known = np.isfinite(coarse_px)
     weights = known.astype(np.float32)
     surface = regional_support(coarse_px, weights, coarse_px.shape, _COARSE_SURFACE)
-    around = cv2.dilate(known.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    around = grow(known, 1)
     with np.errstate(invalid="ignore"):
         is_same = np.abs(surface - coarse_px) < _FAR_FROM_MATCH_PX
     smooth = np.where(known & ~is_same, coarse_px, surface)
@@ -158,7 +156,7 @@ def calm(coarse_px: NDArray[np.float32]) -> NDArray[np.float32]:
     filled = cv2.patchNaNs(coarse_px.copy(), 0.0)
     total = cv2.boxFilter(filled, -1, window, normalize=False)
     mean = total / np.maximum(cv2.boxFilter(counts, -1, window, normalize=False), np.float32(1.0))
-    around = cv2.dilate(known.view(np.uint8), np.ones((3, 3), np.uint8)) > 0
+    around = grow(known, 1)
     with np.errstate(invalid="ignore"):
         is_off = np.abs(mean - coarse_px) > _COARSE_STEP_PX
     cv2.copyTo(coarse_px, is_off.view(np.uint8), mean)

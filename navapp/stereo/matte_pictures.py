@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from navapp.geometry.masks import grow
 from navapp.geometry.rectification import Image, RectifiedPair
 
 # All chosen. This share of the pixels asked for has values up to this one.
@@ -69,11 +70,7 @@ def make_matte_pair(
 
 def find_near_clipped(picture: Image, reach_px: int) -> NDArray[np.bool_]:
     """(H, W) pixels that are clipped, or up to so far (rows, columns) from one that is."""
-    import cv2
-
-    is_clipped = find_clipped(picture).astype(np.uint8)
-    size = 2 * reach_px + 1
-    return np.asarray(cv2.dilate(is_clipped, np.ones((size, size), np.uint8)) > 0)
+    return grow(find_clipped(picture), reach_px)
 
 
 def find_clipped(picture: Image) -> NDArray[np.bool_]:

@@ -125,29 +125,3 @@ def plane_at_origin(equations: NDArray, slope_penalty: float) -> float:
     target = np.append(d, [0.0, 0.0])
     value = np.linalg.lstsq(root[:, None] * design, root * target, rcond=None)[0][0]
     return min(max(value, d.min() - 1.0), d.max() + 1.0)
-
-
-def calmed_slowly(told: NDArray, classes: NDArray) -> NDArray:
-    """Median of five rows, then of five columns, of the pixel's own class.
-
-    An unknown neighbour, and one of another class, counts as the pixel itself.
-    """
-    upright = medians_along(told, classes, 0)
-    return np.where(classes > 0, medians_along(upright, classes, 1), told)
-
-
-def medians_along(values: NDArray, classes: NDArray, axis: int) -> NDArray:
-    steps = (-2, -1, 0, 1, 2)
-    around = np.stack([shifted(values, k, axis) for k in steps])
-    is_alike = np.stack([shifted(classes.astype(float), k, axis) == classes for k in steps])
-    return np.median(np.where(np.isnan(around) | ~is_alike, values, around), axis=0)
-
-
-def shifted(values: NDArray, by: int, axis: int) -> NDArray:
-    """The values `by` further along the axis; the last ones again beyond the rows' end."""
-    places = np.arange(values.shape[axis]) + by
-    inside = np.clip(places, 0, values.shape[axis] - 1)
-    taken = np.take(values, inside, axis=axis)
-    if axis == 1:
-        taken[:, places != inside] = np.nan
-    return taken

@@ -6,7 +6,7 @@ background's layer, of similar colour, and confident. Only measured pixels speak
 carried along a gap and rows can be filled in any order.
 
 Every other row is fitted, the sparser the further from what was measured; a row between two
-fitted ones takes over what they say. A median takes single outliers out.
+fitted ones takes over what they say.
 """
 
 from dataclasses import dataclass
@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from navapp.geometry.bands import run_both
 from navapp.geometry.masks import where
 from navapp.stereo.occlusion.classify import in_two_shares
-from navapp.stereo.occlusion.wls_calm_kernels import calm_rows
 from navapp.stereo.occlusion.wls_fill_kernels import fill_rows
 from navapp.stereo.occlusion.wls_fit_kernels import (
     N_TOLD_OF_A_PLACE,
@@ -108,9 +107,8 @@ def fill_gaps(
         confidence=np.ascontiguousarray(confidence, dtype=np.float32),
     )
     told = _fit_all(scene, settings)
-    disparity, origin = np.empty_like(told), np.empty_like(scene.origin)
-    in_two_shares(lambda *rows: calm_rows(scene, told, *rows, disparity, origin))
-    return disparity, origin
+    filled = where(~np.isnan(told), scene.classes, Origin.UNKNOWN)
+    return told, where(scene.classes == 0, scene.origin, filled)
 
 
 def support_radius_px(matched_px: NDArray[np.float32]) -> int:

@@ -8,6 +8,7 @@ there than the other, and no shift by a pixel makes up for it.
 import numpy as np
 from numpy.typing import NDArray
 
+from navapp.geometry.masks import grow
 from navapp.geometry.rectification import RectifiedPair
 
 # Wider than the highlights of a wet bone: its surroundings tell how bright it should be.
@@ -48,8 +49,7 @@ def without_highlights(pair: RectifiedPair, support_px: NDArray[np.float32]) -> 
     slope = cv2.blur(np.abs(cv2.Sobel(right, cv2.CV_32F, 1, 0, ksize=1)), near) * np.float32(0.5)
     limit = max(_N_SIGMA * sigma, _LEAST_EXCESS) + _WRONG_BY_PX * slope
     is_bright = is_seen & (excess > limit)
-    grown = cv2.dilate(is_bright.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
-    return np.where(grown, np.float32(np.nan), support_px)
+    return np.where(grow(is_bright, 1), np.float32(np.nan), support_px)
 
 
 def _facing(
