@@ -13,12 +13,7 @@ from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.simplify import drawn, is_closed
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer import RenderedView, render_rectified
-from navapp.registration.lookup_kernels import (
-    ModelArrays,
-    VoxelGrid,
-    fill_model_grid,
-    find_vertices,
-)
+from navapp.registration.lookup_kernels import ModelArrays, VoxelGrid, fill_model_grid
 from navapp.registration.vertex_neighbourhoods import compute_curvature, find_neighbours
 from navapp.values import BoneModel
 
@@ -138,10 +133,3 @@ class RegistrationModel:
             total = normals + around.sum(axis=1)
             normals = total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-12)
         return normals
-
-    def nearest(self, points_mm: FloatArray) -> tuple[NDArray[np.int32], FloatArray]:
-        """Index of the nearest model point of each of (N, 3) points, and its distance."""
-        found: tuple[NDArray[np.int32], FloatArray] = find_vertices(
-            np.ascontiguousarray(points_mm), self.arrays
-        )
-        return found

@@ -27,15 +27,6 @@ class PointSet(NamedTuple):
     grid: VoxelGrid  # of nearest points; no voxel is without one
 
 
-class PairSums(NamedTuple):
-    """Weighted sums over pairs (a, b)."""
-
-    weight: FloatArray  # (1,) of w
-    a: FloatArray  # (3,) of w a
-    b: FloatArray  # (3,) of w b
-    ab: FloatArray  # (3, 3) of w a b^T
-
-
 @njit(cache=True, nogil=True)
 def sum_pairs(
     moving: PointSet,
@@ -45,7 +36,7 @@ def sum_pairs(
     first: int,
     step: int,
     distance_mm: FloatArray,
-    sums: PairSums,
+    sums: FloatArray,
 ) -> None:
     """Pair every n-th point with its nearest one, weigh the pair, add it to the sums.
 
@@ -57,7 +48,7 @@ def sum_pairs(
         first: first point.
         step: to the next one.
         distance_mm: (N,) of the pairs, in place; of one out of the kernel's reach, at least that.
-        sums: in place.
+        sums: (4, 4) of w [a; 1] [b; 1]^T, in place.
     """
     points, places, grid = moving.points, fixed.points, fixed.grid
     nx, ny, nz = grid.nearest.shape
@@ -75,9 +66,9 @@ def sum_pairs(
         squared = squared_distance(x, y, z, places, v)
         distance_mm[i] = np.sqrt(squared)
         weight = np.exp(-per_mm2 * squared)
-        sums.weight[0] += weight
+        sums[3, 3] += weight
         for k in range(3):
-            sums.a[k] += weight * points[i, k]
-            sums.b[k] += weight * places[v, k]
+            sums[k, 3] += weight * points[i, k]
+            sums[3, k] += weight * places[v, k]
             for j in range(3):
-                sums.ab[k, j] += weight * points[i, k] * places[v, j]
+                sums[k, j] += weight * points[i, k] * places[v, j]
