@@ -12,9 +12,9 @@ from navapp.geometry.mesh_edges import open_border
 from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.simplify import drawn, is_closed
 from navapp.geometry.transform import FloatArray, RigidTransform
+from navapp.geometry.vertex_neighbourhoods import compute_curvature, find_neighbours
 from navapp.geometry.zbuffer import RenderedView, render_rectified
 from navapp.registration.lookup_kernels import ModelArrays, VoxelGrid, fill_model_grid
-from navapp.registration.vertex_neighbourhoods import compute_curvature, find_neighbours
 from navapp.values import BoneModel
 
 # All chosen: of the grid of nearest vertices, and of the smoothed normals.

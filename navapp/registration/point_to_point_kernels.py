@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from navapp.geometry.motion_kernels import move_point
 from navapp.geometry.transform import FloatArray
 from navapp.registration.lookup_kernels import (
     VoxelGrid,
@@ -13,7 +14,7 @@ from navapp.registration.lookup_kernels import (
     find_voxel,
     squared_distance,
 )
-from navapp.registration.pairing_kernels import Pose, move_point
+from navapp.registration.pairing_kernels import Pose
 
 # A pair further apart than so many widths of the kernel weighs less than 4e-6: it is left out.
 _REACH_WIDTHS = 5.0
@@ -56,7 +57,7 @@ def sum_pairs(
     reach_mm = _REACH_WIDTHS * sigma_mm + np.sqrt(3.0) * grid.voxel
     per_mm2 = 0.5 / (sigma_mm * sigma_mm)
     for i in range(first, points.shape[0], step):
-        x, y, z = move_point(pose, points, i)
+        x, y, z = move_point(pose.rotation, pose.translation, points, i)
         ix, iy, iz = find_voxel(x, y, z, grid)
         ix, iy, iz = min(max(ix, 0), nx - 1), min(max(iy, 0), ny - 1), min(max(iz, 0), nz - 1)
         distance_mm[i] = np.sqrt(squared_distance(x, y, z, places, grid.nearest[ix, iy, iz]))

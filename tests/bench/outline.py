@@ -159,9 +159,9 @@ def near_shares(case: Case, parts: TrackerParts, seed: int) -> Iterator[float]:
     block = parts.outline.block(
         frame.pair, fit.pose, measured.rendered, measured.disparity, coarse_px
     )
-    weight = 1.0 / block.n_sharing
-    if weight.sum() >= FEWEST:
-        yield float(weight[block.find_near(fit.estimate.covariance)].sum() / weight.sum())
+    near = block.find_near(block.jacobian, np.zeros(6), fit.estimate.covariance)
+    if near.n_all >= FEWEST:
+        yield near.n_near / near.n_all
 
 
 def row(low: float, high: float, edges: list[Edge]) -> str:
