@@ -105,3 +105,15 @@ def perpendicular_axes(directions: FloatArray) -> FloatArray:
     first = np.cross(ahead, np.eye(3)[least])
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     return np.stack([first, np.cross(ahead, first)], axis=1)
+
+
+def turn_towards(positions_mm: FloatArray) -> FloatArray:
+    """(C, 3, 3) rotations that turn the optical axis into the line of sight of each place."""
+    x, y, z = (positions_mm / np.linalg.norm(positions_mm, axis=1, keepdims=True)).T
+    # Rodrigues for the turn of (0, 0, 1) into (x, y, z), which is in front: z > 0.
+    part = 1.0 / (1.0 + z)
+    rotation = np.empty((len(positions_mm), 3, 3))
+    rotation[:, 0] = np.column_stack([1.0 - x * x * part, -x * y * part, x])
+    rotation[:, 1] = np.column_stack([-x * y * part, 1.0 - y * y * part, y])
+    rotation[:, 2] = np.column_stack([-x, -y, z])
+    return rotation

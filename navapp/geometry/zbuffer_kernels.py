@@ -13,6 +13,7 @@ from navapp.geometry.lane_kernels import (
     store,
     where_positive,
 )
+from navapp.geometry.motion_kernels import move_point
 
 
 @njit(cache=True, nogil=True)
@@ -37,11 +38,8 @@ def project_points(
         depths: (V,) in place, mm.
     """
     for i in range(points.shape[0]):
-        x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        depth = rotation[2, 0] * x + rotation[2, 1] * y + rotation[2, 2] * z + translation[2]
+        across, down, depth = move_point(rotation, translation, points, i)
         scale = focal_px / depth if depth > 1e-6 else np.nan
-        across = rotation[0, 0] * x + rotation[0, 1] * y + rotation[0, 2] * z + translation[0]
-        down = rotation[1, 0] * x + rotation[1, 1] * y + rotation[1, 2] * z + translation[1]
         pixels[i, 0], pixels[i, 1] = scale * across + centre[0], scale * down + centre[1]
         depths[i] = depth
 
@@ -61,13 +59,10 @@ def bounds_of_points(
     u0, v0, u1, v1 = np.inf, np.inf, -np.inf, -np.inf
     near, far = np.inf, -np.inf
     for i in range(points.shape[0]):
-        x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        depth = rotation[2, 0] * x + rotation[2, 1] * y + rotation[2, 2] * z + translation[2]
+        across, down, depth = move_point(rotation, translation, points, i)
         near, far = min(near, depth), max(far, depth)
         if not depth > 1e-6:
             continue
-        across = rotation[0, 0] * x + rotation[0, 1] * y + rotation[0, 2] * z + translation[0]
-        down = rotation[1, 0] * x + rotation[1, 1] * y + rotation[1, 2] * z + translation[1]
         u, v = focal_px * across / depth + centre[0], focal_px * down / depth + centre[1]
         u0, v0, u1, v1 = min(u0, u), min(v0, v), max(u1, u), max(v1, v)
     return u0, v0, u1, v1, near, far

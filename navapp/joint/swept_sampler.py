@@ -1,16 +1,12 @@
 """Poses of a tibia beside a known femur: drawn over the knee's range, scored on measured depth."""
 
-from functools import partial
-
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from navapp.geometry.bands import in_row_bands
 from navapp.geometry.transform import RigidTransform
 from navapp.limb import Hinge, Poses
 from navapp.registration import DepthMap, PoseSampler, RegistrationModel, distinct
 from navapp.registration.pose_sampler import Draw
-from navapp.registration.pose_sampler_kernels import score_poses
 
 # Always the same draws: the same pictures give the same pose.
 _SEED = 20
@@ -73,10 +69,8 @@ class SweptSampler(PoseSampler):
         turn = camera_from_femur.rotation
         rotations = np.ascontiguousarray(turn @ poses.rotations)
         shifts_mm = poses.shifts_mm @ turn.T + camera_from_femur.translation_mm
-        scores = np.empty(len(rotations))
-        fixed = self._surface, draw.n_points, rotations, shifts_mm, depth, sigma_mm, scores
-        in_row_bands(len(rotations), partial(score_poses, *fixed))
-        return poses.select(np.argsort(-scores, kind="stable")[: draw.n_kept])
+        best, _ = self._find_best(depth, (rotations, shifts_mm), draw, sigma_mm)
+        return poses.select(best)
 
     def _draw_around(self, poses: Poses, draw: Draw, random: np.random.Generator) -> Poses:
         """Poses in femur coordinates and others around them, as far as the hinge allows them."""

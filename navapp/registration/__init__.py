@@ -2,19 +2,16 @@
 
 from navapp.registration.bimcc import estimate_at, fit_bimcc, fit_pose
 from navapp.registration.bimcc_kernels import BimccSettings
-from navapp.registration.depth_map import DepthMap
 from navapp.registration.initial import find_initial
 from navapp.registration.model import RegistrationModel
 from navapp.registration.multi_start import (
     ScoredPose,
-    compute_explained_fraction,
     distinct,
     find_poses,
     is_same_pose,
     make_far_starts,
     make_near_starts,
     make_scattered_starts,
-    make_tilted_starts,
     rank_fits,
     select_poses,
 )
@@ -22,6 +19,7 @@ from navapp.registration.point_to_point import solve_bimcc_literal, solve_icp
 from navapp.registration.pose_sampler import PoseSampler
 from navapp.registration.register import Outcome, Registration, register
 from navapp.registration.scene import Scene
+from navapp.registration.score_kernels import DepthMap
 
 __all__ = [
     "BimccSettings",
@@ -32,7 +30,6 @@ __all__ = [
     "RegistrationModel",
     "Scene",
     "ScoredPose",
-    "compute_explained_fraction",
     "distinct",
     "estimate_at",
     "find_initial",
@@ -43,7 +40,6 @@ __all__ = [
     "make_far_starts",
     "make_near_starts",
     "make_scattered_starts",
-    "make_tilted_starts",
     "rank_fits",
     "register",
     "select_poses",

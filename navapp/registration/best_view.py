@@ -11,15 +11,9 @@ import numpy as np
 from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.transform import RigidTransform
 from navapp.registration.edge_tables import make_edge_tables
-from navapp.registration.hypotheses import (
-    Views,
-    compute_poses,
-    place_hypothesis,
-    take_edges,
-    vary_hypotheses,
-)
-from navapp.registration.initial_kernels import score_edges
+from navapp.registration.hypotheses import compute_poses, place_hypothesis, vary_hypotheses
 from navapp.registration.model import RegistrationModel
+from navapp.registration.score_kernels import score_edges
 from navapp.values import AspectGraph
 
 # All chosen, on a simulated knee: pictures are made so many times smaller; a gradient is felt so
@@ -44,15 +38,14 @@ def find_best_view(
         expected: rectified left camera from bone.
     """
     pair = _crop_rows(pair)
-    nothing = np.empty((0, 0, 3))
-    views = Views(np.asarray(aspects.directions), nothing, nothing, take_edges(aspects))
     centre_mm = expected.apply(model.centre_mm)
-    here = place_hypothesis(views, expected, model.centre_mm)
-    some = vary_hypotheses(here, views, _STEP_DEG, _ROLL_DEG, _SHIFT_MM)
+    here = place_hypothesis(aspects.directions, expected, model.centre_mm)
+    some = vary_hypotheses(here, aspects.directions, _STEP_DEG, _ROLL_DEG, _SHIFT_MM)
     nearest_mm = max(float(centre_mm[2]) - _IN_FRONT_MM, 1.0)
     tables = make_edge_tables(pair, _SCALE, _REACH_PX, pair.geometry.disparity_px(nearest_mm))
     score = np.zeros(len(some.place), dtype=np.float32)
-    score_edges(some, views.edges, _N_POINTS, tables, score, (0, len(score)))
+    edges = aspects.starts, aspects.points_mm, aspects.tangents
+    score_edges(some, *edges, _N_POINTS, tables, score, (0, len(score)))
     rotations, shifts_mm = compute_poses(some)
     best = int(np.argmax(score))
     return RigidTransform.from_parts(

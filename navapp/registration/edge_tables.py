@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from navapp.geometry.bands import run_both
 from navapp.geometry.box import Box
 from navapp.geometry.rectification import Image, RectifiedPair
-from navapp.registration.depth_map import scale_optics
-from navapp.registration.initial_kernels import N_BINS, EdgeTables
+from navapp.registration.score_kernels import N_BINS, EdgeTables, scale_optics
 
 # Chosen; the gate: so much of the box is flat, and what is no steeper than so many sigma of noise.
 _BLUR_PX = 0.8

@@ -5,13 +5,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.geometry.directions import ViewCone, make_view_rotation, turn_between
+from navapp.geometry.directions import (
+    ViewCone,
+    make_view_rotation,
+    turn_between,
+    turn_towards,
+)
 from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.transform import FloatArray, RigidTransform, rotation_from_vector
-from navapp.registration.depth_map import DepthMap, scale_optics
-from navapp.registration.initial_kernels import Hypotheses, ViewEdges
 from navapp.registration.model import RegistrationModel
 from navapp.registration.scene import Scene
+from navapp.registration.score_kernels import DepthMap, Hypotheses, scale_optics
 from navapp.values import AspectGraph
 
 # All chosen. Between views, where no aspects say; points of each view's surface.
@@ -30,15 +34,12 @@ class Views(NamedTuple):
     directions: FloatArray  # (V, 3) unit, towards the camera
     surface_mm: FloatArray  # (V, n, 3) points of the surface that each view shows
     anchors_mm: FloatArray  # (V, 2, 3) points that are likely to be measured
-    edges: ViewEdges | None  # of the same views, where they are known
+    aspects: AspectGraph | None  # of the same views, where their edges are known
 
 
 def make_views(model: RegistrationModel, cone: ViewCone, aspects: AspectGraph | None) -> Views:
     """What a model shows to the views of its aspects, or without aspects to those of a cone."""
-    if aspects is None:
-        directions, edges = cone.directions(_VIEW_STEP_DEG), None
-    else:
-        directions, edges = np.asarray(aspects.directions), take_edges(aspects)
+    directions = cone.directions(_VIEW_STEP_DEG) if aspects is None else aspects.directions
     rng = np.random.default_rng(len(directions))
     can_pair = model.arrays.can_pair
     surface, anchors = [], []
@@ -48,15 +49,7 @@ def make_views(model: RegistrationModel, cone: ViewCone, aspects: AspectGraph | 
         shown = shown if len(shown) else np.arange(len(model.points_mm))
         surface.append(model.points_mm[rng.choice(shown, _N_SURFACE_POINTS)])
         anchors.append(_find_anchors(model.points_mm[shown], direction))
-    return Views(directions, np.array(surface), np.array(anchors), edges)
-
-
-def take_edges(aspects: AspectGraph) -> ViewEdges:
-    """The edges of all views, as the kernels read them."""
-    # Copies: a read-only array is another type to a kernel.
-    return ViewEdges(
-        np.array(aspects.starts), np.array(aspects.points_mm), np.array(aspects.tangents)
-    )
+    return Views(directions, np.array(surface), np.array(anchors), aspects)
 
 
 def _find_anchors(shown_mm: FloatArray, direction: FloatArray) -> FloatArray:
@@ -128,23 +121,25 @@ def spread_hypotheses(
         np.repeat(chosen, n_anchors * len(rolls)).astype(np.int32),
         np.repeat(rotations[:, None], n_anchors, axis=1).reshape(-1, 3, 3),
         np.repeat(views.anchors_mm[chosen].reshape(-1, 3), len(rolls), axis=0),
-        _turn_towards(places_mm),
+        turn_towards(places_mm),
         places_mm,
     )
 
 
-def place_hypothesis(views: Views, pose: RigidTransform, anchor_mm: FloatArray) -> Hypotheses:
-    """The one hypothesis of a pose (camera from bone), with the view that is nearest to it.
+def place_hypothesis(
+    directions: FloatArray, pose: RigidTransform, anchor_mm: FloatArray
+) -> Hypotheses:
+    """The one hypothesis of a pose (camera from bone), with the nearest of views (V, 3).
 
     `anchor_mm` (3,) is the point of the bone that stays in place when the hypothesis is varied.
     """
     position_mm = pose.apply(anchor_mm)
     towards_camera = -pose.rotation.T @ position_mm
-    turn = _turn_towards(position_mm[None])
+    turn = turn_towards(position_mm[None])
     return Hypotheses(
         np.zeros(1, dtype=np.int32),
         np.zeros(1, dtype=np.int32),
-        np.array([np.argmax(views.directions @ towards_camera)], dtype=np.int32),
+        np.array([np.argmax(directions @ towards_camera)], dtype=np.int32),
         turn.transpose(0, 2, 1) @ pose.rotation,
         anchor_mm[None],
         turn,
@@ -152,22 +147,29 @@ def place_hypothesis(views: Views, pose: RigidTransform, anchor_mm: FloatArray) 
     )
 
 
-def select_hypotheses(some: Hypotheses, which: NDArray[np.intp]) -> Hypotheses:
-    """Some of the hypotheses, in that order."""
-    return some._replace(orientation=some.orientation[which], place=some.place[which])
+def keep_best(some: Hypotheses, score: NDArray[np.float32], n: int) -> Hypotheses:
+    """The n hypotheses of the largest scores (H,), largest first; ties in their order."""
+    kept = np.arange(len(score))
+    if n < len(score):
+        kept = np.flatnonzero(score >= np.partition(score, -n)[-n])
+    kept = kept[np.argsort(-score[kept], kind="stable")][:n]
+    return some._replace(orientation=some.orientation[kept], place=some.place[kept])
 
 
 def vary_hypotheses(
-    some: Hypotheses, views: Views, step_deg: float, roll_deg: float, shift_mm: float
+    some: Hypotheses, directions: FloatArray, step_deg: float, roll_deg: float, shift_mm: float
 ) -> Hypotheses:
-    """Each hypothesis with its neighbours: views within a step, rolls and places beside it."""
+    """Each hypothesis with its neighbours: views within a step, rolls and places beside it.
+
+    The views' directions (V, 3) are those that the hypotheses index.
+    """
     rolls = np.radians([-roll_deg, 0.0, roll_deg])
     turns = np.array([rotation_from_vector((0.0, 0.0, roll)) for roll in rolls])
     sides_mm = shift_mm * np.array([(0, 0, 0), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0)])
     # Which hypothesis is varied, and the view that it has then.
-    here = views.directions[some.view_index[some.orientation]]
-    varied, view = np.nonzero(here @ views.directions.T >= np.cos(np.radians(step_deg)))
-    tilts = [turn_between(views.directions[k], here[h]) for h, k in zip(varied, view, strict=True)]
+    here = directions[some.view_index[some.orientation]]
+    varied, view = np.nonzero(here @ directions.T >= np.cos(np.radians(step_deg)))
+    tilts = [turn_between(directions[k], here[h]) for h, k in zip(varied, view, strict=True)]
     tilted = some.rotation[some.orientation[varied]] @ np.array(tilts).reshape(-1, 3, 3)
     varied, view = np.repeat(varied, len(turns)), np.repeat(view, len(turns))
     places = len(sides_mm) * varied[:, None] + np.arange(len(sides_mm))
@@ -178,7 +180,7 @@ def vary_hypotheses(
         view.astype(np.int32),
         (turns @ tilted[:, None]).reshape(-1, 3, 3),
         some.anchor_mm[some.orientation[varied]],
-        _turn_towards(positions_mm),
+        turn_towards(positions_mm),
         positions_mm,
     )
 
@@ -188,35 +190,3 @@ def compute_poses(some: Hypotheses) -> tuple[FloatArray, FloatArray]:
     rotations = some.towards[some.place] @ some.rotation[some.orientation]
     anchored = np.einsum("hij,hj->hi", rotations, some.anchor_mm[some.orientation])
     return rotations, some.position_mm[some.place] - anchored
-
-
-def find_distinct(
-    rotations: FloatArray, centres_mm: FloatArray, same_mm: float, same_deg: float
-) -> list[int]:
-    """Indices of poses that repeat none before them, in their order.
-
-    Two poses are the same when they differ by no more than `same_deg` in their rotations (H, 3, 3)
-    and `same_mm` in where they put the bone's centre, (H, 3).
-    """
-    least_trace = 1.0 + 2.0 * np.cos(np.radians(same_deg))
-    left = np.arange(len(rotations))
-    kept: list[int] = []
-    while len(left):
-        first = int(left[0])
-        kept.append(first)
-        trace = np.einsum("hij,ij->h", rotations[left], rotations[first])
-        distance_mm = np.linalg.norm(centres_mm[left] - centres_mm[first], axis=1)
-        left = left[(trace < least_trace) | (distance_mm > same_mm)]
-    return kept
-
-
-def _turn_towards(positions_mm: FloatArray) -> FloatArray:
-    """(C, 3, 3) rotations that turn the optical axis into the line of sight of each place."""
-    x, y, z = (positions_mm / np.linalg.norm(positions_mm, axis=1, keepdims=True)).T
-    # Rodrigues for the turn of (0, 0, 1) into (x, y, z), which is in front: z > 0.
-    part = 1.0 / (1.0 + z)
-    rotation = np.empty((len(positions_mm), 3, 3))
-    rotation[:, 0] = np.column_stack([1.0 - x * x * part, -x * y * part, x])
-    rotation[:, 1] = np.column_stack([-x * y * part, 1.0 - y * y * part, y])
-    rotation[:, 2] = np.column_stack([-x, -y, z])
-    return rotation

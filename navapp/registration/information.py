@@ -2,12 +2,11 @@
 
 import math
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.geometry.transform import FloatArray, RigidTransform
+from navapp.geometry.transform import FloatArray, RigidTransform, skew
 from navapp.registration.pairing_kernels import Pairs
 from navapp.registration.step_kernels import (
     FREE_FRACTION,
@@ -86,20 +85,28 @@ def compute_information(
     free = (turned @ vectors[:, is_free]).T
     if eigenvalues[0] <= _SINGULAR_FRACTION * eigenvalues[-1]:
         return Information(np.diag([np.inf] * 6), free)
-    seen = _Seen(seen_mm, lever_mm, pose.rotation, pose.rotation @ (centre_mm - seen_mm))
-    change = seen.pose_by_points[:6, :6]
+    arm_mm = pose.rotation @ (centre_mm - seen_mm)
+    change = _pose_by_points(pose.rotation, lever_mm, arm_mm)
+    of_pose, inverse = change[:6, :6], np.linalg.inv(H)
+    covariance = n_sharing_errors * _propagate(of_pose, inverse)
     if n_sharing_relief <= 0.0:
-        return Information(n_sharing_errors * _propagate(change, np.linalg.inv(H)), free)
+        return Information(covariance, free)
     relief = n_sharing_relief * RELIEF_SD_MM**2
-    sized, g = _sum_sized_system(pairs, n, seen)
-    squared, _ = _sum_sized_system(pairs._replace(weight=pairs.weight**2), n, seen)
-    inverse = np.linalg.inv(H)
-    return Information(
+    squared_pairs = pairs._replace(weight=pairs.weight**2)
+    squared, _ = _sum_sized_system(squared_pairs, n, seen_mm, lever_mm)
+    relief_covariance = relief * _propagate(of_pose @ inverse, squared[:6, :6])
+    # The size as a seventh unknown; where the pairs do not fix it, as expected.
+    H, g = _sum_sized_system(pairs, n, seen_mm, lever_mm)
+    H[6, 6] += n_sharing_errors / (_SIZE_SD * lever_mm) ** 2
+    inverse = np.asarray(np.linalg.inv(H), dtype=np.float64)
+    sized = SizedPose(
+        change @ (inverse @ -g),
         n_sharing_errors * _propagate(change, inverse),
-        free,
-        relief * _propagate(change @ inverse, squared[:6, :6]),
-        _find_sized(sized, g, squared, seen, n_sharing_errors, relief),
+        arm_mm,
+        lever_mm,
+        relief * _propagate(change @ inverse, squared),
     )
+    return Information(covariance, free, relief_covariance, sized)
 
 
 def _propagate(change: FloatArray, covariance: FloatArray) -> FloatArray:
@@ -108,59 +115,26 @@ def _propagate(change: FloatArray, covariance: FloatArray) -> FloatArray:
     return 0.5 * (propagated + propagated.T)
 
 
-class _Seen(NamedTuple):
-    """The seen surface, and how its points' motion becomes one of the pose."""
+def _pose_by_points(rotation: FloatArray, lever_mm: float, arm_mm: FloatArray) -> FloatArray:
+    """(7, 7) public twist and growth by the solver's (rotation x lever, translation, growth).
 
-    centre_mm: FloatArray  # (3,) in bone coordinates
-    lever_mm: float
-    rotation: FloatArray  # scene from bone
-    arm_mm: FloatArray  # (3,) from that centre to the model's, in the scene's frame
-
-    @property
-    def pose_by_points(self) -> FloatArray:
-        """(7, 7) public twist and growth by the solver's (rotation x lever, translation, growth).
-
-        What moves the points one way moves the pose the other.
-        """
-        change = np.zeros((7, 7))
-        turn = -self.rotation / self.lever_mm
-        x, y, z = self.arm_mm
-        change[:3, :3] = -np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]) @ turn
-        change[:3, 3:6], change[3:6, :3], change[6, 6] = -self.rotation, turn, 1.0
-        return change
-
-
-def _find_sized(
-    H: FloatArray, g: FloatArray, squared: FloatArray, seen: _Seen, n_sharing: float, relief: float
-) -> SizedPose:
-    """The pose with the size as a seventh unknown; where the pairs do not fix it, as expected.
-
-    Args:
-        H: (7, 7) normal equations.
-        g: (7,) of them.
-        squared: (7, 7) as `H`, with squared weights.
-        seen: surface.
-        n_sharing: so many pairs have their errors in common.
-        relief: variance of the bone's relief, times the pairs that share it.
+    What moves the points one way moves the pose the other. `rotation` (3, 3) is scene from bone;
+    the arm (3,) reaches from the seen surface's centre to the model's, in the scene's frame.
     """
-    H = H.copy()
-    H[6, 6] += n_sharing / (_SIZE_SD * seen.lever_mm) ** 2
-    inverse: FloatArray = np.asarray(np.linalg.inv(H), dtype=np.float64)
-    change = seen.pose_by_points
-    return SizedPose(
-        change @ (inverse @ -g),
-        n_sharing * _propagate(change, inverse),
-        seen.arm_mm,
-        seen.lever_mm,
-        relief * _propagate(change @ inverse, squared),
-    )
+    change = np.zeros((7, 7))
+    turn = -rotation / lever_mm
+    change[:3, :3] = -skew(arm_mm) @ turn
+    change[:3, 3:6], change[3:6, :3], change[6, 6] = -rotation, turn, 1.0
+    return change
 
 
-def _sum_sized_system(pairs: Pairs, n: int, seen: _Seen) -> tuple[FloatArray, FloatArray]:
+def _sum_sized_system(
+    pairs: Pairs, n: int, centre_mm: FloatArray, lever_mm: float
+) -> tuple[FloatArray, FloatArray]:
     """Normal equations (7, 7), (7,) of the motion of the points and the growth of the model."""
     H, g = np.zeros((7, 7)), np.zeros(7)
-    H[:6, :6], g[:6] = sum_plane_system(pairs, n, seen.centre_mm, seen.lever_mm)
-    mixed, squares, product_mm = sum_size_terms(pairs, n, seen.centre_mm, seen.lever_mm)
+    H[:6, :6], g[:6] = sum_plane_system(pairs, n, centre_mm, lever_mm)
+    mixed, squares, product_mm = sum_size_terms(pairs, n, centre_mm, lever_mm)
     # Growth of the model brings residuals down, as growth of the points would bring them up.
     H[:6, 6] = H[6, :6] = -mixed
     H[6, 6], g[6] = squares, -product_mm
@@ -190,9 +164,8 @@ def leaves_direction_free(
         return True
     middle_mm = seen_mm.mean(axis=0)
     lever_mm = math.sqrt(((seen_mm - middle_mm) ** 2).sum(axis=1).mean())
-    x, y, z = middle_mm - centre_mm
     about_seen = np.eye(6)
-    about_seen[:3, 3:] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
+    about_seen[:3, 3:] = skew(centre_mm - middle_mm)
     about_seen[3:] *= lever_mm
     spread = np.linalg.eigvalsh(about_seen @ covariance @ about_seen.T)
     return bool(_are_free(1.0 / np.maximum(spread[::-1], np.finfo(float).tiny)).any())

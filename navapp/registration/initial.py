@@ -22,22 +22,22 @@ from navapp.registration.edge_tables import make_edge_tables
 from navapp.registration.hypotheses import (
     Views,
     compute_poses,
-    find_distinct,
+    keep_best,
     make_views,
     sample_scene,
-    select_hypotheses,
     spread_hypotheses,
     thin_views,
     vary_hypotheses,
 )
-from navapp.registration.initial_kernels import Hypotheses, score_edges, score_surface
 from navapp.registration.model import RegistrationModel
 from navapp.registration.multi_start import (
     ANYWHERE_SETTINGS,
     ScoredPose,
     compute_explained_fraction,
+    find_distinct,
 )
 from navapp.registration.scene import Scene
+from navapp.registration.score_kernels import Hypotheses, score_edges, score_surface
 from navapp.values import AspectGraph
 from navapp.values.progress import tell_part
 
@@ -112,30 +112,24 @@ def _rank_hypotheses(
     def score(some: Hypotheses, level: Level | None) -> NDArray[np.float32]:
         n, found = len(some.place), np.zeros(len(some.place), dtype=np.float32)
         in_row_bands(n, partial(score_surface, some, views.surface_mm, depth, _REACH_MM, found))
-        if level is None or views.edges is None:
+        aspects = views.aspects
+        if level is None or aspects is None:
             return found
         tables = make_edge_tables(pair, level.scale, level.reach_px, largest_px)
         on_edges = np.zeros_like(found)
-        in_row_bands(n, partial(score_edges, some, views.edges, level.n_points, tables, on_edges))
+        edges = aspects.starts, aspects.points_mm, aspects.tangents
+        in_row_bands(n, partial(score_edges, some, *edges, level.n_points, tables, on_edges))
         return found + on_edges
 
     some = spread_hypotheses(views, chosen, _ROLL_STEP_DEG, places_mm)
-    some = select_hypotheses(some, _find_largest(score(some, None), _N_PASSED))
+    some = keep_best(some, score(some, None), _N_PASSED)
     on_progress(_SCORED)
-    some = select_hypotheses(some, _find_largest(score(some, _COARSE), _N_REFINED))
+    some = keep_best(some, score(some, _COARSE), _N_REFINED)
     steps = 0.75 * _COARSE_STEP_DEG, _ROLL_STEP_DEG / 3.0, 0.3 * _REACH_MM
-    some = vary_hypotheses(some, views, *steps)
-    some = select_hypotheses(some, _find_largest(score(some, _FINE), len(some.place)))
+    some = vary_hypotheses(some, views.directions, *steps)
+    some = keep_best(some, score(some, _FINE), len(some.place))
     on_progress(_REFINED)
     return some
-
-
-def _find_largest(score: NDArray[np.float32], n: int) -> NDArray[np.intp]:
-    """Indices of the n largest scores, largest first; ties in their order."""
-    kept = np.arange(len(score))
-    if n < len(score):
-        kept = np.flatnonzero(score >= np.partition(score, -n)[-n])
-    return kept[np.argsort(-score[kept], kind="stable")][:n]
 
 
 def _fit_starts(

@@ -114,21 +114,6 @@ def _descend(
 
 
 @njit(cache=True, nogil=True)
-def find_vertices(
-    points_mm: FloatArray, model: ModelArrays
-) -> tuple[NDArray[np.int32], FloatArray]:
-    """Nearest vertex of each of (N, 3) points in bone coordinates, and its distance."""
-    n = points_mm.shape[0]
-    index, distance_mm = np.empty(n, dtype=np.int32), np.empty(n)
-    for i in range(n):
-        x, y, z = points_mm[i, 0], points_mm[i, 1], points_mm[i, 2]
-        best = find_vertex(x, y, z, model.points, model.neighbours, model.grid)
-        index[i] = best
-        distance_mm[i] = np.sqrt(squared_distance(x, y, z, model.points, best))
-    return index, distance_mm
-
-
-@njit(cache=True, nogil=True)
 def offer_point(
     points_mm: FloatArray, i: int, ix: int, iy: int, iz: int, grid: VoxelGrid, squared: FloatArray
 ) -> None:

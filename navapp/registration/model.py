@@ -12,14 +12,9 @@ from navapp.geometry.mesh_edges import open_border
 from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.simplify import drawn, is_closed
 from navapp.geometry.transform import FloatArray, RigidTransform
+from navapp.geometry.vertex_neighbourhoods import compute_curvature, find_neighbours
 from navapp.geometry.zbuffer import RenderedView, render_rectified
-from navapp.registration.lookup_kernels import (
-    ModelArrays,
-    VoxelGrid,
-    fill_model_grid,
-    find_vertices,
-)
-from navapp.registration.vertex_neighbourhoods import compute_curvature, find_neighbours
+from navapp.registration.lookup_kernels import ModelArrays, VoxelGrid, fill_model_grid
 from navapp.values import BoneModel
 
 # All chosen: of the grid of nearest vertices, and of the smoothed normals.
@@ -140,10 +135,3 @@ class RegistrationModel:
             total = normals + around.sum(axis=1)
             normals = total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-12)
         return normals
-
-    def nearest(self, points_mm: FloatArray) -> tuple[NDArray[np.int32], FloatArray]:
-        """Index of the nearest model point of each of (N, 3) points, and its distance."""
-        found: tuple[NDArray[np.int32], FloatArray] = find_vertices(
-            np.ascontiguousarray(points_mm), self.arrays
-        )
-        return found

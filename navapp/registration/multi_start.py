@@ -11,9 +11,14 @@ from navapp.geometry.directions import sphere_spiral
 from navapp.geometry.transform import FloatArray, RigidTransform, rotation_angle_deg
 from navapp.registration.bimcc import DEFAULT, fit_coarsely
 from navapp.registration.bimcc_kernels import BimccSettings
-from navapp.registration.coverage import compute_coverage
 from navapp.registration.model import RegistrationModel
-from navapp.registration.pairing_kernels import Pose, make_pairs, measure_pairs, pair_forward
+from navapp.registration.pairing_kernels import (
+    Pose,
+    make_pairs,
+    measure_pairs,
+    pair_backward,
+    pair_forward,
+)
 from navapp.registration.scene import Scene
 from navapp.registration.step_kernels import weigh
 from navapp.values import PoseEstimate, Reason
@@ -29,6 +34,11 @@ _FAR_SHIFT_MM = 8.0
 _N_REFINED, _REFINED_FRACTION = 3, 0.5
 # A different pose that explains as much as this of the best one makes that one ambiguous.
 AMBIGUOUS_FRACTION = 0.9
+# Near the outline little of a surface is seen, and its depth is uncertain.
+_LEAST_COSINE = 0.45
+# Of the coverage: about so many model points are asked, the scene's own may be so far apart, so
+# many widths of the kernel are near.
+_N_ASKED, _REACH_MM, _NEAR_SIGMAS = 3000, 10.0, 1.5
 # For starts that are near, or may be anywhere.
 NEAR_SETTINGS = BimccSettings(model_points=1000, max_iterations=35)
 ANYWHERE_SETTINGS = BimccSettings(model_points=1000, max_iterations=60, widest_mm=30.0)
@@ -56,7 +66,7 @@ AnyFit = TypeVar("AnyFit", bound=_RankedFit)
 
 def make_near_starts(rough: RigidTransform, place_mm: FloatArray) -> list[RigidTransform]:
     """A rough pose, and tilts of it about a place (3,) in the scene's frame: tried first."""
-    return make_tilted_starts(rough, place_mm, *_NEAR_TILTS)
+    return make_tilted_starts(rough, place_mm, _NEAR_TILTS)
 
 
 def make_far_starts(rough: RigidTransform, place_mm: FloatArray) -> list[RigidTransform]:
@@ -65,13 +75,17 @@ def make_far_starts(rough: RigidTransform, place_mm: FloatArray) -> list[RigidTr
 
 
 def make_tilted_starts(
-    pose: RigidTransform, place_mm: FloatArray, tilt_deg: float, n_tilts: int
+    pose: RigidTransform, place_mm: FloatArray, *tilts: tuple[float, int]
 ) -> list[RigidTransform]:
-    """A pose and tilts of it about a place (3,) in the scene's frame, axes all around."""
+    """A pose and tilts of it about a place (3,) in the scene's frame, axes all around.
+
+    `tilts` are (angle in degrees, how many) of each kind.
+    """
     starts = [pose]
-    for axis in sphere_spiral(n_tilts):
-        twist = np.concatenate([np.zeros(3), np.radians(tilt_deg) * axis])
-        starts.append(pose.move(twist, place_mm))
+    for tilt_deg, n_tilts in tilts:
+        for axis in sphere_spiral(n_tilts):
+            twist = np.concatenate([np.zeros(3), np.radians(tilt_deg) * axis])
+            starts.append(pose.move(twist, place_mm))
     return starts
 
 
@@ -96,9 +110,7 @@ def make_scattered_starts(
     starts = []
     for shift in step_mm * axes:
         moved = pose.move(np.concatenate([shift, np.zeros(3)]), place_mm)
-        starts.append(moved)
-        for tilt_deg, n_tilts in tilts:
-            starts += make_tilted_starts(moved, place_mm + shift, tilt_deg, n_tilts)[1:]
+        starts += make_tilted_starts(moved, place_mm + shift, *tilts)
     return starts
 
 
@@ -146,9 +158,34 @@ def compute_explained_fraction(
     measure_pairs(arrays, model.arrays, pose, pairs, n)
     kernels: float = weigh(pairs, n, sigma_mm, settings.n_sigmas, 0.0).kernels
     fraction = kernels / max(n_asked, 1)
+    coverage = compute_coverage(scene, model, scene_from_bone, sigma_mm)
+    return fraction if coverage is None else fraction * coverage
+
+
+def compute_coverage(
+    scene: Scene, model: RegistrationModel, scene_from_bone: RigidTransform, sigma_mm: float
+) -> float | None:
+    """Fraction of the model points facing the camera that have the scene's surface beneath them.
+
+    A pose can lay the model on most points and still be wrong: then much of the model that the
+    camera should see has no point near it.
+
+    Near is said by the width of a kernel. 0 when no part of the model faces the camera; None for a
+    scene without a camera.
+    """
     if scene.camera_mm is None:
-        return fraction
-    return fraction * compute_coverage(scene, model, scene_from_bone, sigma_mm)
+        return None
+    pose, arrays = Pose(*scene_from_bone.inverse_parts()), scene.arrays
+    every = max(1, len(model.points_mm) // _N_ASKED)
+    pairs = make_pairs(len(model.points_mm) // every + 1)
+    n, n_visible = pair_backward(
+        arrays, scene.grid, model.arrays, pose, every, _REACH_MM, _LEAST_COSINE, pairs, 0
+    )
+    if n_visible == 0:
+        return 0.0
+    measure_pairs(arrays, model.arrays, pose, pairs, n)
+    is_near = np.abs(pairs.residual[:n]) < _NEAR_SIGMAS * sigma_mm
+    return float(is_near.sum() / n_visible)
 
 
 def select_poses(scored: Sequence[ScoredPose], most: int = _N_REFINED) -> list[RigidTransform]:
@@ -182,16 +219,29 @@ def distinct(
     poses: Sequence[RigidTransform], centre_mm: FloatArray, n: int | None = None
 ) -> list[RigidTransform]:
     """The first n that repeat no earlier one; `centre_mm` (3,) in the bone's frame."""
-    kept, places_mm = list[RigidTransform](), np.empty((len(poses), 3))
-    for pose in poses:
-        if len(kept) == n:
-            break
-        # Most lie far from each other: comparing their rotations would take most of a search.
-        off_mm = np.abs(places_mm[: len(kept)] - pose.apply(centre_mm)).max(axis=1, initial=0.0)
-        near = (kept[k] for k in np.flatnonzero(off_mm <= _SAME_MM))
-        if not any(is_same_pose(pose, other, centre_mm) for other in near):
-            places_mm[len(kept)] = pose.apply(centre_mm)
-            kept.append(pose)
+    rotations = np.array([pose.rotation for pose in poses])
+    centres_mm = np.array([pose.apply(centre_mm) for pose in poses])
+    kept = find_distinct(rotations, centres_mm, _SAME_MM, _SAME_DEG)
+    return [poses[k] for k in kept[:n]]
+
+
+def find_distinct(
+    rotations: FloatArray, centres_mm: FloatArray, same_mm: float, same_deg: float
+) -> list[int]:
+    """Indices of poses that repeat none before them, in their order.
+
+    Two poses are the same when they differ by no more than `same_deg` in their rotations (H, 3, 3)
+    and `same_mm` in where they put the bone's centre, (H, 3).
+    """
+    least_trace = 1.0 + 2.0 * np.cos(np.radians(same_deg))
+    left = np.arange(len(rotations))
+    kept: list[int] = []
+    while len(left):
+        first = int(left[0])
+        kept.append(first)
+        trace = np.einsum("hij,ij->h", rotations[left], rotations[first])
+        distance_mm = np.linalg.norm(centres_mm[left] - centres_mm[first], axis=1)
+        left = left[(trace < least_trace) | (distance_mm > same_mm)]
     return kept
 
 

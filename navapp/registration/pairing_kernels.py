@@ -7,6 +7,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from navapp.geometry.facing_kernels import faces
+from navapp.geometry.motion_kernels import move_point
 from navapp.geometry.transform import FloatArray
 from navapp.registration.lookup_kernels import (
     ModelArrays,
@@ -62,25 +63,6 @@ def make_pairs(n: int) -> Pairs:
 
 
 @njit(cache=True, nogil=True)
-def move_point(pose: Pose, points: FloatArray, i: int) -> tuple[float, float, float]:
-    """Point i after a pose."""
-    R, t = pose.rotation, pose.translation
-    x, y, z = points[i, 0], points[i, 1], points[i, 2]
-    return (
-        R[0, 0] * x + R[0, 1] * y + R[0, 2] * z + t[0],
-        R[1, 0] * x + R[1, 1] * y + R[1, 2] * z + t[1],
-        R[2, 0] * x + R[2, 1] * y + R[2, 2] * z + t[2],
-    )
-
-
-@njit(cache=True, nogil=True)
-def place_camera(scene: SceneArrays, pose: Pose) -> FloatArray:
-    """(3,) the scene's camera in bone coordinates."""
-    camera: FloatArray = pose.rotation @ scene.camera + pose.translation
-    return camera
-
-
-@njit(cache=True, nogil=True)
 def pair_forward(
     scene: SceneArrays, model: ModelArrays, pose: Pose, every: int, pairs: Pairs
 ) -> int:
@@ -89,10 +71,10 @@ def pair_forward(
     Writes `scene` and `vertex` of the pairs; returns how many there are.
     """
     points, normals, places, can_pair = scene.points, model.normals, model.points, model.can_pair
-    camera = place_camera(scene, pose)
+    camera = pose.rotation @ scene.camera + pose.translation
     n = 0
     for i in range(0, points.shape[0], every):
-        x, y, z = move_point(pose, points, i)
+        x, y, z = move_point(pose.rotation, pose.translation, points, i)
         v = find_vertex(x, y, z, places, model.neighbours, model.grid)
         if not can_pair[v]:
             continue
@@ -116,9 +98,9 @@ def pair_backward(
     how many vertices are visible.
     """
     points, normals, places, can_pair = scene.points, model.normals, model.points, model.can_pair
-    camera = place_camera(scene, pose)
+    camera = pose.rotation @ scene.camera + pose.translation
     rotation = pose.rotation.T.copy()
-    inverse = Pose(rotation, -(rotation @ pose.translation))
+    translation = -(rotation @ pose.translation)
     n_visible = 0
     for v in range(0, places.shape[0], every):
         if not can_pair[v]:
@@ -126,7 +108,7 @@ def pair_backward(
         if scene.has_camera and not faces(camera, places, normals, v, least_cosine):
             continue
         n_visible += 1
-        x, y, z = move_point(inverse, places, v)
+        x, y, z = move_point(rotation, translation, places, v)
         ix, iy, iz = find_voxel(x, y, z, grid)
         if not has_voxel(grid, ix, iy, iz):
             continue
@@ -146,10 +128,10 @@ def measure_pairs(scene: SceneArrays, model: ModelArrays, pose: Pose, pairs: Pai
     plane would lie off a curved bone between the vertices.
     """
     points, places, normals, curvature = scene.points, model.points, model.normals, model.curvature
-    camera = place_camera(scene, pose)
+    camera = pose.rotation @ scene.camera + pose.translation
     for k in range(n):
         i, v = pairs.scene[k], pairs.vertex[k]
-        x, y, z = move_point(pose, points, i)
+        x, y, z = move_point(pose.rotation, pose.translation, points, i)
         pairs.point[k, 0], pairs.point[k, 1], pairs.point[k, 2] = x, y, z
         dx, dy, dz = x - places[v, 0], y - places[v, 1], z - places[v, 2]
         gx, gy, gz = normals[v, 0], normals[v, 1], normals[v, 2]

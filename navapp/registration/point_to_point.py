@@ -16,7 +16,7 @@ from navapp.registration.bimcc import MIN_POINTS, Solution, solution_at
 from navapp.registration.lookup_kernels import VoxelGrid, fill_scene_grid
 from navapp.registration.model import RegistrationModel
 from navapp.registration.pairing_kernels import Pose
-from navapp.registration.point_to_point_kernels import PairSums, PointSet, sum_pairs
+from navapp.registration.point_to_point_kernels import PointSet, sum_pairs
 from navapp.registration.scene import NO_GRID, Scene
 
 # All chosen: the print has no rule for the kernel's width. It begins at so many median distances
@@ -62,23 +62,17 @@ def solve_bimcc_literal(
     return _iterate(scene, model, start, _step(scene, n_points), _step(model.points_mm, n_points))
 
 
-def kabsch(
-    a_mm: FloatArray, b_mm: FloatArray, weight: FloatArray, frames: RigidTransform
-) -> RigidTransform:
-    """The pose that moves b (N, 3) to a (N, 3) with the least weighted squared distance.
+def solve_sums(sums: FloatArray, frames: RigidTransform) -> RigidTransform:
+    """The pose that moves points b to points a with the least weighted squared distance.
 
-    Never a reflection. Its frames are those of another pose, scene from bone.
+    Never a reflection. Its frames are those of another pose, scene from bone; `sums` (4, 4) are
+    those of w [a; 1] [b; 1]^T over the pairs.
 
     Source: Kabsch 1976.
     """
-    ab = (a_mm * weight[:, None]).T @ b_mm
-    return solve_sums(PairSums(weight.sum(keepdims=True), weight @ a_mm, weight @ b_mm, ab), frames)
-
-
-def solve_sums(sums: PairSums, frames: RigidTransform) -> RigidTransform:
-    """As `kabsch`, from the sums over the pairs."""
-    a0, b0 = sums.a / sums.weight, sums.b / sums.weight
-    rotation = nearest_rotation(sums.ab / sums.weight - np.outer(a0, b0))
+    weight = sums[3, 3]
+    a0, b0 = sums[:3, 3] / weight, sums[3, :3] / weight
+    rotation = nearest_rotation(sums[:3, :3] / weight - np.outer(a0, b0))
     return RigidTransform.from_parts(frames.target, frames.source, rotation, a0 - rotation @ b0)
 
 
@@ -120,7 +114,7 @@ def _iterate(
         sigma_mm = _limit_mm(_FIRST_MEDIANS * float(np.median(distance_mm)))
     for iterations in range(1, _MAX_ITERATIONS + 1):
         sums, _ = _pair(pairing, pose, sigma_mm)
-        if not sums.weight[0] > 0.0:
+        if not sums[3, 3] > 0.0:
             break
         stepped = prolong_step(pose, solve_sums(sums, pose), model.centre_mm)
         moved_mm, pose = pose.mean_motion_mm(stepped, model.hull_mm), stepped
@@ -143,8 +137,10 @@ def _limit_mm(sigma_mm: float) -> float:
     return min(max(sigma_mm, _NARROWEST_MM), _WIDEST_MM)
 
 
-def _pair(pairing: _Pairing, pose: RigidTransform, sigma_mm: float) -> tuple[PairSums, FloatArray]:
-    """Sums over the pairs of scene points a and model points b, and the pairs' distances.
+def _pair(
+    pairing: _Pairing, pose: RigidTransform, sigma_mm: float
+) -> tuple[FloatArray, FloatArray]:
+    """Sums (4, 4) over pairs of scene points a and model points b, and the pairs' distances.
 
     Equation (4): the stacked sets a and b, forward then backward; plain ICP pairs forward only.
     Equations (7) to (9) in half-quadratic form: the kernel's value is the pair's weight. Half of
@@ -155,26 +151,19 @@ def _pair(pairing: _Pairing, pose: RigidTransform, sigma_mm: float) -> tuple[Pai
     backward = Pose(np.array(pose.rotation), np.array(pose.translation_mm))
     ahead_mm, back_mm = np.empty(len(seen.points)), np.empty(len(bone.points))
 
-    def sum_share(share: int) -> tuple[PairSums, PairSums]:
-        ahead, back = _make_sums(), _make_sums()
+    def sum_share(share: int) -> FloatArray:
+        sums = np.zeros((2, 4, 4))
         span = share * every, 2 * every
-        sum_pairs(seen, bone, forward, sigma_mm, *span, ahead_mm, ahead)
+        sum_pairs(seen, bone, forward, sigma_mm, *span, ahead_mm, sums[0])
         if back_every:
             span = share * back_every, 2 * back_every
-            sum_pairs(bone, seen, backward, sigma_mm, *span, back_mm, back)
-        return ahead, back
+            sum_pairs(bone, seen, backward, sigma_mm, *span, back_mm, sums[1])
+        return sums
 
     shares = run_both(partial(sum_share, 0), partial(sum_share, 1))
-    ahead, back = (PairSums(*map(np.add, *two)) for two in zip(*shares, strict=True))
-    stacked = PairSums(
-        ahead.weight + back.weight, ahead.a + back.b, ahead.b + back.a, ahead.ab + back.ab.T
-    )
+    ahead, back = np.add(*shares)
     paired_back_mm = back_mm[::back_every] if back_every else back_mm[:0]
-    return stacked, np.concatenate([ahead_mm[::every], paired_back_mm])
-
-
-def _make_sums() -> PairSums:
-    return PairSums(np.zeros(1), np.zeros(3), np.zeros(3), np.zeros((3, 3)))
+    return ahead + back.T, np.concatenate([ahead_mm[::every], paired_back_mm])
 
 
 def _prepare_scene(points_mm: FloatArray, is_looked_up: bool) -> PointSet:

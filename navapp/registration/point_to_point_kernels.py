@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from navapp.geometry.motion_kernels import move_point
 from navapp.geometry.transform import FloatArray
 from navapp.registration.lookup_kernels import (
     VoxelGrid,
@@ -13,7 +14,7 @@ from navapp.registration.lookup_kernels import (
     find_voxel,
     squared_distance,
 )
-from navapp.registration.pairing_kernels import Pose, move_point
+from navapp.registration.pairing_kernels import Pose
 
 # A pair further apart than so many widths of the kernel weighs less than 4e-6: it is left out.
 _REACH_WIDTHS = 5.0
@@ -27,15 +28,6 @@ class PointSet(NamedTuple):
     grid: VoxelGrid  # of nearest points; no voxel is without one
 
 
-class PairSums(NamedTuple):
-    """Weighted sums over pairs (a, b)."""
-
-    weight: FloatArray  # (1,) of w
-    a: FloatArray  # (3,) of w a
-    b: FloatArray  # (3,) of w b
-    ab: FloatArray  # (3, 3) of w a b^T
-
-
 @njit(cache=True, nogil=True)
 def sum_pairs(
     moving: PointSet,
@@ -45,7 +37,7 @@ def sum_pairs(
     first: int,
     step: int,
     distance_mm: FloatArray,
-    sums: PairSums,
+    sums: FloatArray,
 ) -> None:
     """Pair every n-th point with its nearest one, weigh the pair, add it to the sums.
 
@@ -57,7 +49,7 @@ def sum_pairs(
         first: first point.
         step: to the next one.
         distance_mm: (N,) of the pairs, in place; of one out of the kernel's reach, at least that.
-        sums: in place.
+        sums: (4, 4) of w [a; 1] [b; 1]^T, in place.
     """
     points, places, grid = moving.points, fixed.points, fixed.grid
     nx, ny, nz = grid.nearest.shape
@@ -65,7 +57,7 @@ def sum_pairs(
     reach_mm = _REACH_WIDTHS * sigma_mm + np.sqrt(3.0) * grid.voxel
     per_mm2 = 0.5 / (sigma_mm * sigma_mm)
     for i in range(first, points.shape[0], step):
-        x, y, z = move_point(pose, points, i)
+        x, y, z = move_point(pose.rotation, pose.translation, points, i)
         ix, iy, iz = find_voxel(x, y, z, grid)
         ix, iy, iz = min(max(ix, 0), nx - 1), min(max(iy, 0), ny - 1), min(max(iz, 0), nz - 1)
         distance_mm[i] = np.sqrt(squared_distance(x, y, z, places, grid.nearest[ix, iy, iz]))
@@ -75,9 +67,9 @@ def sum_pairs(
         squared = squared_distance(x, y, z, places, v)
         distance_mm[i] = np.sqrt(squared)
         weight = np.exp(-per_mm2 * squared)
-        sums.weight[0] += weight
+        sums[3, 3] += weight
         for k in range(3):
-            sums.a[k] += weight * points[i, k]
-            sums.b[k] += weight * places[v, k]
+            sums[k, 3] += weight * points[i, k]
+            sums[3, k] += weight * places[v, k]
             for j in range(3):
-                sums.ab[k, j] += weight * points[i, k] * places[v, j]
+                sums[k, j] += weight * points[i, k] * places[v, j]

@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.bands import in_row_bands
+from navapp.geometry.even_order import order_evenly
 from navapp.geometry.transform import FloatArray, RigidTransform
-from navapp.registration.depth_map import DepthMap
 from navapp.registration.model import RegistrationModel
 from navapp.registration.multi_start import ScoredPose, distinct
-from navapp.registration.pose_sampler_kernels import SurfacePoints, score_poses
+from navapp.registration.score_kernels import DepthMap, SurfacePoints, score_poses
 
 # All settings below are chosen. Always the same draws: the same pictures give the same pose.
 _SEED = 20
@@ -66,6 +66,8 @@ class PoseSampler:
     """Draws poses of one bone and scores them on maps of depth; holds only what is constant."""
 
     def __init__(self, model: RegistrationModel) -> None:
+        # Poses are the best of thousands: few points that are spread by chance would find a pose
+        # that suits them alone.
         usable = np.flatnonzero(model.is_usable)
         order = usable[order_evenly(model.points_mm[usable])]
         self._centre_mm = model.centre_mm
@@ -162,26 +164,8 @@ class PoseSampler:
         self, depth: DepthMap, poses: tuple[FloatArray, FloatArray], draw: Draw, sigma_mm: float
     ) -> tuple[NDArray[np.intp], float]:
         """Indices of the poses to keep, best first, and the best one's score."""
-        scores = np.empty(draw.n_poses)
+        scores = np.empty(len(poses[0]))
         fixed = self._surface, draw.n_points, *poses, depth, sigma_mm, scores
-        in_row_bands(draw.n_poses, partial(score_poses, *fixed))
+        in_row_bands(len(scores), partial(score_poses, *fixed))
         best = np.argsort(-scores, kind="stable")[: draw.n_kept]
         return best, float(scores[best[0]])
-
-
-def order_evenly(points_mm: FloatArray) -> NDArray[np.int64]:
-    """(N,) indices of points (N, 3), such that any first n are spread over all of them.
-
-    Poses are the best of thousands: few points that are spread by chance would find a pose that
-    suits them alone. Neighbours follow each other along a curve that fills space (Morton); halving
-    it again and again (van der Corput) gives the order.
-    """
-    size_mm = np.ptp(points_mm, axis=0).max()
-    cells = (points_mm - points_mm.min(axis=0)) * (1023.0 / max(size_mm, 1e-9))
-    bits = (cells.astype(np.int64)[:, :, None] >> np.arange(10)) & 1
-    along = np.argsort((bits << (3 * np.arange(10) + np.arange(3)[:, None])).sum(axis=(1, 2)))
-    halved = np.zeros(1, dtype=np.int64)
-    while len(halved) < len(points_mm):
-        halved = np.concatenate([2 * halved, 2 * halved + 1])
-    order: NDArray[np.int64] = along[halved[halved < len(points_mm)]]
-    return order

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, replace
 from enum import Enum
-from itertools import chain
 from typing import Literal
 
 import numpy as np
@@ -10,11 +9,11 @@ import numpy as np
 from navapp.geometry.transform import RigidTransform
 from navapp.registration.bimcc import DEFAULT, MIN_POINTS, Solution, solve_bimcc
 from navapp.registration.bimcc_kernels import BimccSettings
-from navapp.registration.coverage import compute_coverage
 from navapp.registration.model import RegistrationModel
 from navapp.registration.multi_start import (
     ANYWHERE_SETTINGS,
     NEAR_SETTINGS,
+    compute_coverage,
     compute_explained_fraction,
     find_poses,
     make_far_starts,
@@ -42,7 +41,7 @@ _CELL_MM, _APART_CELLS = 3.0, (0.8, 1.6)
 _GOAL = Goal(np.empty((0, 3)), tolerance_mm=np.inf, seen_limit_mm=2.0)
 _LEAST_FACING_COSINE, _N_TRE_POINTS = 0.2, 200
 # Tilts that leave no orientation far from a start: angles, and how many of each.
-_RINGS_DEG, _N_RING_TILTS = (35.0, 70.0, 105.0, 140.0, 175.0), 14
+_RINGS = ((35.0, 14), (70.0, 14), (105.0, 14), (140.0, 14), (175.0, 14))
 
 
 class Outcome(Enum):
@@ -154,8 +153,7 @@ def _make_starts_all_around(
     middle_mm = np.median(scene.points_mm, axis=0)  # a stray point far away must not move it
     shift_mm = middle_mm - start.apply(np.median(model.points_mm, axis=0))
     centred = start.move(np.concatenate([shift_mm, np.zeros(3)]), np.zeros(3))
-    rings = (make_tilted_starts(centred, middle_mm, tilt, _N_RING_TILTS) for tilt in _RINGS_DEG)
-    return [centred, *chain.from_iterable(ring[1:] for ring in rings)]
+    return make_tilted_starts(centred, middle_mm, *_RINGS)
 
 
 def _judge(
@@ -165,9 +163,7 @@ def _judge(
     estimate, information = solution.estimate, solution.information
     if information is None:
         return Registration(Outcome.FAILED, estimate.reasons, (), estimate, None, None, n_starts)
-    seen = None
-    if scene.camera_mm is not None:
-        seen = compute_coverage(scene, model, estimate.camera_from_bone, solution.sigma_mm)
+    seen = compute_coverage(scene, model, estimate.camera_from_bone, solution.sigma_mm)
     tre_mm = _predict_tre_mm(scene, model, estimate)
     reasons = find_reasons(_gather_evidence(scene, model, solution, seen, tre_mm))
     outcome = Outcome.FAILED
@@ -191,18 +187,13 @@ def _gather_evidence(
     estimate = solution.estimate
     evidence = Evidence(
         estimate=estimate,
+        # Nothing tells what hides the rest.
+        agreement=None if seen is None else Agreement(0, seen, 0.0, *[np.nan] * 3),
         extent_mm=min(_extent_mm(scene), _extent_mm(model)),
         seen_error_mm=np.inf if tre_mm is None else tre_mm,
         plan_mm=0.0,
         goal=_GOAL,
     )
-    if seen is not None:
-        # Nothing tells what hides the rest.
-        agreement = Agreement(
-            n_visible=0, coverage=seen, hidden_fraction=0.0, behind_fraction=np.nan,
-            inlier_fraction=np.nan, spread_ratio=np.nan,
-        )  # fmt: skip
-        evidence = replace(evidence, agreement=agreement)
     if scene.knows_noise:
         return replace(evidence, rms_ratio=estimate.rms_mm / estimate.expected_rms_mm)
     kernel_fraction = solution.sigma_mm / DEFAULT.widest_at_rest_mm

@@ -4,7 +4,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from navapp.geometry.transform import FloatArray
 from navapp.registration.information import leaves_direction_free
@@ -47,7 +46,7 @@ class ResidualBlock:
     def find_near(
         self, rows: FloatArray, step: FloatArray, covariance: FloatArray
     ) -> "NearResiduals":
-        """Which residuals the k unknowns of a pose allow.
+        """Those residuals that the k unknowns of a pose allow, to be joined.
 
         Args:
             rows: (N, k) how the predictions grow with the unknowns.
@@ -57,22 +56,18 @@ class ResidualBlock:
         by_unknowns = ((rows @ covariance) * rows).sum(axis=1)
         expected = self.variance + by_unknowns + self.common_sd**2
         is_near = (self.residual - rows @ step) ** 2 < _GATE_SIGMAS**2 * expected
-        count = 1.0 / self.n_sharing
-        return NearResiduals(is_near, float(count.sum()), float(count[is_near].sum()))
-
-    def select(self, near: "NearResiduals", rows: FloatArray) -> FurtherBlock:
-        """Those residuals that a pose allows, to be joined; the rows (N, k) are of all."""
-        kept = near.is_near
-        return FurtherBlock(
-            rows[kept], self.residual[kept], self.variance[kept], self.n_sharing[kept],
+        block = FurtherBlock(
+            rows[is_near], self.residual[is_near], self.variance[is_near], self.n_sharing[is_near],
             self.common_sd,
         )  # fmt: skip
+        count = 1.0 / self.n_sharing
+        return NearResiduals(block, float(count.sum()), float(count[is_near].sum()))
 
 
 class NearResiduals(NamedTuple):
     """Those of a block's residuals that a pose allows."""
 
-    is_near: NDArray[np.bool_]  # (N,)
+    block: FurtherBlock
     # of residuals with errors of their own: all, and those that are near.
     n_all: float
     n_near: float
@@ -131,7 +126,7 @@ def join(
     near = block.find_near(block.jacobian, surface.step, surface.covariance)
     joined = None
     if not (near.is_other or near.is_few):
-        joined = solve_joined(surface, block.select(near, block.jacobian), surface.step)
+        joined = solve_joined(surface, near.block, surface.step)
         if joined.step @ np.linalg.solve(estimate.covariance, joined.step) > _APART:
             joined = None
     step = surface.step if joined is None else joined.step
@@ -165,7 +160,6 @@ def _join_size(
     if near.is_few or near.is_other:
         return sized.scale_noise(surface.noise_variance_ratio)
     starts = surface.step, np.append(pose_step, 0.0)
-    allowed = block.select(near, rows)
-    found = (solve_joined(surface, allowed, start) for start in starts)
+    found = (solve_joined(surface, near.block, start) for start in starts)
     best = min(found, key=lambda one: one.cost)
     return replace(sized, step=best.step, covariance=best.covariance)

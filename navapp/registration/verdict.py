@@ -223,11 +223,6 @@ RULES = (
 _AGAINST_PLACE = frozenset(rule.reason for rule in RULES if rule.doubts_place)
 # Of these, what a better view mends, and no better place, where something hides the bone.
 _LITTLE_SEEN = frozenset({Reason.COVERAGE_LOW, Reason.DEGENERATE})
-_OF_AGREEMENT = tuple(
-    rule
-    for rule in RULES
-    if rule.reason in (Reason.COVERAGE_LOW, Reason.SEEN_THROUGH, Reason.OUTLIERS)
-)
 
 
 def find_reasons(evidence: Evidence) -> tuple[Reason, ...]:
@@ -260,7 +255,7 @@ def decide(evidence: Evidence) -> Verdict:
 def is_bone_absent(agreement: Agreement) -> bool:
     """Whether so little of the model agrees that the bone is not there."""
     evidence = Evidence(agreement=agreement)
-    return any(rule.status(evidence) is Status.LOST for rule in _OF_AGREEMENT)
+    return any(rule.status(evidence) is Status.LOST for rule in RULES)
 
 
 def is_little_occluded(verdict: Verdict) -> bool:

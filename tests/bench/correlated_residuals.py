@@ -71,7 +71,7 @@ def fitted(seed: int, name: str) -> Iterator[Answer]:
     for _ in range(_STARTS):
         off = rng.normal(0.0, np.repeat([_START_OFF_MM, np.radians(_START_OFF_DEG)], 3))
         # One pair of pictures, rectified around the truth, for every start.
-        frame = replace(near, start=true.move(off, true.apply(parts.centre_mm)))
+        frame = replace(near, start=true.move(off, true.apply(parts.model.centre_mm)))
         fit = parts.find(frame)
         if fit is None or fit.measured.rendered is None:
             continue
@@ -82,7 +82,9 @@ def fitted(seed: int, name: str) -> Iterator[Answer]:
         fit = parts.with_outline(frame, fit)
         targets = bone.mesh.vertices_mm[bone.mesh.visible_vertices(fit.pose)]
         bounds_mm = (
-            one.estimate.predict_tre_mm(parts.centre_mm, targets[:: max(1, len(targets) // 200)])
+            one.estimate.predict_tre_mm(
+                parts.model.centre_mm, targets[:: max(1, len(targets) // 200)]
+            )
             for one in (fit, shown)
         )
         error_mm = compute_mean_tre_mm(fit.pose, true, bone, _NO_TARGETS)

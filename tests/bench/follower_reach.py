@@ -48,11 +48,11 @@ def rounds(
     """Off before, share of the samples that answer, off after; infinite without a fit."""
     parts = TrackerParts(sequence.rig, BoneModel("femur", sequence.mesh))
     model, meter = parts.model, parts.meter
-    radius_mm = np.linalg.norm(model.hull_mm - parts.centre_mm, axis=1).mean()
+    radius_mm = np.linalg.norm(model.hull_mm - parts.model.centre_mm, axis=1).mean()
     for scene in sequence.scenes:
         for seed in range(n_seeds):
             turn_deg = float(np.degrees(shift_mm / radius_mm))
-            start = disturbed(scene.pose, parts.centre_mm, turn_deg, shift_mm, seed)
+            start = disturbed(scene.pose, parts.model.centre_mm, turn_deg, shift_mm, seed)
             expected = meter.render(scene.pair, start, NEAR_BOX)
             assert expected is not None
             measured = meter.measure_on_samples(expected)

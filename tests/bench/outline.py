@@ -79,7 +79,8 @@ def main() -> int:
         )
     print("\n| size of the plan | frames | edges near: median | least |\n|---|---|---|---|")
     for size, found in shares.items():
-        print(f"| x {size:g} | {len(found)} | {np.median(found):.2f} | {min(found):.2f} |")
+        least = min(found, default=np.nan)
+        print(f"| x {size:g} | {len(found)} | {np.median(found):.2f} | {least:.2f} |")
     return 0
 
 
@@ -132,7 +133,9 @@ def joined(
     for one in (fit, parts.with_outline(frame, fit)):
         mesh = parts.model.bone.mesh
         targets = mesh.vertices_mm[mesh.visible_vertices(one.pose)]
-        bound_mm = one.estimate.predict_tre_mm(parts.centre_mm, targets[:: len(targets) // 200])
+        bound_mm = one.estimate.predict_tre_mm(
+            parts.model.centre_mm, targets[:: len(targets) // 200]
+        )
         answer += [compute_mean_tre_mm(one.pose, true, case.bone, np.empty((0, 3))), bound_mm]
     yield answer[0], answer[1], answer[2], answer[3]
 
@@ -144,7 +147,7 @@ def located(case: Case, parts: TrackerParts, seed: int) -> tuple[Frame, Fit | No
     off = np.concatenate(
         [rng.normal(0.0, START_OFF_MM, 3), np.radians(rng.normal(0.0, START_OFF_DEG, 3))]
     )
-    start = true.move(off, true.apply(parts.centre_mm))
+    start = true.move(off, true.apply(parts.model.centre_mm))
     frame = parts.frame(taken.left, taken.right, start)
     fit = parts.find(frame)
     return frame, None if fit is None or fit.measured.rendered is None else fit
@@ -159,9 +162,9 @@ def near_shares(case: Case, parts: TrackerParts, seed: int) -> Iterator[float]:
     block = parts.outline.block(
         frame.pair, fit.pose, measured.rendered, measured.disparity, coarse_px
     )
-    weight = 1.0 / block.n_sharing
-    if weight.sum() >= FEWEST:
-        yield float(weight[block.find_near(fit.estimate.covariance)].sum() / weight.sum())
+    near = block.find_near(block.jacobian, np.zeros(6), fit.estimate.covariance)
+    if near.n_all >= FEWEST:
+        yield near.n_near / near.n_all
 
 
 def row(low: float, high: float, edges: list[Edge]) -> str:

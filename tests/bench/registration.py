@@ -19,6 +19,7 @@ from pathlib import Path
 os.environ.setdefault("OMP_NUM_THREADS", "2")
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from navapp.geometry.transform import RigidTransform
 from navapp.registration import (
@@ -248,7 +249,7 @@ def _lists(
 
 
 def _on_model(pose: RigidTransform, scene: Clouded, model: RegistrationModel) -> float:
-    _, distance = model.nearest(pose.inverse().apply(scene.points_mm))
+    distance, _ = cKDTree(model.points_mm).query(pose.inverse().apply(scene.points_mm))
     return float((distance < _NEAR_MM).mean())
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.ply import read_ply
@@ -95,10 +96,11 @@ def scenes(
 def information_limit_mm(bone: Bone, scene: Clouded) -> float:
     """TRE of least squares on the true bone points and the dense surface, from the truth."""
     dense, pose = bone.dense, scene.true
+    tree = cKDTree(dense.points_mm)
     points = scene.points_mm[:N_ON_BONE]
     for _ in range(10):
         moved = pose.inverse().apply(points)
-        index, _ = dense.nearest(moved)
+        _, index = tree.query(moved)
         normals, offset = dense.normals[index], moved - dense.points_mm[index]
         curvature = dense.arrays.curvature[index]
         curved = np.stack(
@@ -122,7 +124,8 @@ def least_share(bone: Bone, scene: Clouded) -> float:
     Lengths are in units of the seen surface's radius.
     """
     points = scene.true.inverse().apply(scene.points_mm[:N_ON_BONE])
-    normals = bone.dense.normals[bone.dense.nearest(points)[0]]
+    _, index = cKDTree(bone.dense.points_mm).query(points)
+    normals = bone.dense.normals[index]
     offset = points - points.mean(axis=0)
     radius = np.sqrt((offset**2).sum(axis=1).mean())
     rows = np.hstack([normals, np.cross(offset, normals) / radius])

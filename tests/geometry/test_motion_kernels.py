@@ -1,9 +1,9 @@
-"""The mean displacement of points, beside the same in numpy."""
+"""Moved points and their mean displacement, beside the same in numpy."""
 
 import numpy as np
 import pytest
 
-from navapp.geometry.motion_kernels import find_mean_motion
+from navapp.geometry.motion_kernels import find_mean_motion, move_point, rotate
 
 pytestmark = pytest.mark.kernel
 
@@ -14,6 +14,14 @@ def test_the_mean_motion_is_numpys() -> None:
     points = rng.normal(size=(41, 3))
     expected = np.linalg.norm(points @ turned.T + shifted, axis=1).mean()
     assert find_mean_motion(turned, shifted, points) == pytest.approx(expected, rel=1e-12)
+
+
+def test_turned_and_moved_points_are_numpys() -> None:
+    rng = np.random.default_rng(4)
+    R, t, points = rng.normal(size=(3, 3)), rng.normal(size=3), rng.normal(size=(5, 3))
+    for i, point in enumerate(points):
+        assert rotate(R, points, i) == pytest.approx(R @ point, rel=1e-12)
+        assert move_point(R, t, points, i) == pytest.approx(R @ point + t, rel=1e-12)
 
 
 def test_no_points_have_no_mean() -> None:

@@ -7,7 +7,7 @@ import numpy as np
 
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from navapp.registration import RegistrationModel, Scene
-from navapp.registration.lookup_kernels import ModelArrays, VoxelGrid
+from navapp.registration.lookup_kernels import ModelArrays, VoxelGrid, find_vertex
 from navapp.registration.pairing_kernels import (
     Pairs,
     Pose,
@@ -79,3 +79,11 @@ def measured_pairs(case: Case) -> tuple[Pairs, int, reference.Measured, np.ndarr
     measure_pairs(case.scene, case.model, case.pose, pairs, n)
     expected = reference.measure_pairs(case.scene, case.model, case.R, case.t, chosen, vertex)
     return pairs, n, expected, vertex
+
+
+def find_vertices(points_mm: np.ndarray, model: RegistrationModel) -> tuple[np.ndarray, np.ndarray]:
+    """Vertex that the kernel finds for each of (N, 3) points in bone coordinates, and how far."""
+    arrays = model.arrays
+    looked_up = arrays.points, arrays.neighbours, arrays.grid
+    index = np.array([find_vertex(*point, *looked_up) for point in points_mm], dtype=np.int32)
+    return index, np.linalg.norm(points_mm - arrays.points[index], axis=1)

@@ -7,7 +7,7 @@ import pytest
 
 from navapp.preop import build_aspects
 from navapp.registration.best_view import find_best_view
-from navapp.registration.hypotheses import Views, compute_poses, place_hypothesis
+from navapp.registration.hypotheses import compute_poses, place_hypothesis
 from navapp.tracking.surface_meter import NEAR_BOX, WIDE_VIEW
 from tests.tracking.rooms import cone, room
 
@@ -29,9 +29,8 @@ def scene():
 
 def test_a_hypothesis_of_a_pose_is_that_pose(scene) -> None:
     _, true, tracker, aspects = scene
-    nothing = np.empty((0, 0, 3))
-    views = Views(np.asarray(aspects.directions), nothing, nothing, None)
-    rotations, shifts = compute_poses(place_hypothesis(views, true, tracker.model.centre_mm))
+    here = place_hypothesis(aspects.directions, true, tracker.model.centre_mm)
+    rotations, shifts = compute_poses(here)
     np.testing.assert_allclose(rotations[0], true.rotation, atol=1e-12)
     np.testing.assert_allclose(shifts[0], true.translation_mm, atol=1e-9)
 

@@ -6,26 +6,30 @@ import pytest
 
 from navapp.geometry import Box, RectifiedPair
 from navapp.geometry.directions import ViewCone, make_view_rotation
-from navapp.geometry.transform import RigidTransform, rotation_angle_deg, rotation_from_vector
+from navapp.geometry.transform import (
+    RigidTransform,
+    read_only,
+    rotation_angle_deg,
+    rotation_from_vector,
+)
 from navapp.geometry.zbuffer import render_rectified
 from navapp.preop import build_aspects
 from navapp.registration import DepthMap, RegistrationModel, Scene, find_initial
-from navapp.registration.depth_map import Optics, scale_optics
 from navapp.registration.edge_tables import make_edge_tables, quantise_gradients, spread_responses
 from navapp.registration.hypotheses import (
     compute_poses,
-    find_distinct,
+    keep_best,
     make_views,
     sample_scene,
-    select_hypotheses,
     spread_hypotheses,
     thin_views,
     vary_hypotheses,
 )
-from navapp.registration.initial_kernels import (
+from navapp.registration.score_kernels import (
     EdgeTables,
     Hypotheses,
-    ViewEdges,
+    Optics,
+    scale_optics,
     score_edges,
     score_surface,
 )
@@ -150,9 +154,9 @@ def test_pictures_decide_between_poses_that_the_surface_allows() -> None:
         np.array([pose.rotation for pose in poses]), np.zeros((4, 3)), np.array([np.eye(3)] * 4),
         np.array([pose.translation_mm for pose in poses]),
     )  # fmt: skip
-    edges = make_views(model(), CONE, aspects()).edges
+    edges = aspects().starts, aspects().points_mm, aspects().tangents
     score = np.zeros(4, dtype=np.float32)
-    score_edges(some, edges, 120, tables, score, (0, 4))
+    score_edges(some, *edges, 120, tables, score, (0, 4))
     assert score[0] > 0.7
     assert score[0] > score[1] + 0.1
     assert score[0] > score[2] + 0.2
@@ -182,12 +186,26 @@ def test_hypotheses_put_their_anchor_at_their_place_and_face_the_camera() -> Non
         np.testing.assert_allclose(sight, -place / np.linalg.norm(place), atol=1e-9)
 
 
+def selected(some: Hypotheses, which: np.ndarray) -> Hypotheses:
+    return some._replace(orientation=some.orientation[which], place=some.place[which])
+
+
+def test_the_best_are_kept_in_the_order_of_their_scores_and_ties_in_their_own() -> None:
+    some = random_hypotheses(6)
+    score = np.array([0.2, 0.7, 0.1, 0.7, 0.9, 0.2], dtype=np.float32)
+    for n in (0, 1, 2, 4, 6, 9):
+        which = np.array([4, 1, 3, 0, 5, 2], dtype=np.intp)[:n]
+        kept, expected = keep_best(some, score, n), selected(some, which)
+        np.testing.assert_array_equal(kept.orientation, expected.orientation)
+        np.testing.assert_array_equal(kept.place, expected.place)
+
+
 def test_neighbours_keep_the_anchor_near_and_hold_the_hypothesis_itself() -> None:
     views = make_views(model(), CONE, None)
     some = spread_hypotheses(views, thin_views(views, 16.0), 90.0, np.array([(10.0, -20.0, 400.0)]))
-    one = select_hypotheses(some, np.array([5]))
+    one = selected(some, np.array([5]))
     (pose,) = poses_of(one)
-    beside = poses_of(vary_hypotheses(one, views, 12.0, 6.0, 2.0))
+    beside = poses_of(vary_hypotheses(one, views.directions, 12.0, 6.0, 2.0))
     angles = np.array([rotation_angle_deg(pose, other) for other in beside])
     assert angles.min() < 1e-3
     assert angles.max() < 20.0
@@ -196,22 +214,10 @@ def test_neighbours_keep_the_anchor_near_and_hold_the_hypothesis_itself() -> Non
     assert max(moved) < 2.1
 
 
-def test_hypotheses_that_repeat_an_earlier_one_are_left_out() -> None:
-    views = make_views(model(), CONE, None)
-    places = np.array([(0.0, 0.0, 400.0), (0.5, 0.0, 400.0), (90.0, 0.0, 400.0)])
-    some = spread_hypotheses(views, np.array([0]), 360.0, places)
-    assert len(some.orientation) == 6
-    rotations, shifts = compute_poses(some)
-    kept = find_distinct(rotations, rotations @ model().centre_mm + shifts, 12.0, 15.0)
-    assert kept[0] == 0
-    assert 1 not in kept
-    assert 2 in kept
-
-
 def test_the_views_of_aspects_have_their_edges() -> None:
     views = make_views(model(), CONE, aspects())
     assert np.array_equal(views.directions, aspects().directions)
-    assert len(views.surface_mm) == len(views.edges.starts) - 1 == len(aspects())
+    assert len(views.surface_mm) == len(views.aspects.starts) - 1 == len(aspects())
 
 
 def test_a_cone_needs_an_axis_with_a_length() -> None:
@@ -237,7 +243,7 @@ def random_hypotheses(n: int) -> Hypotheses:
     views = make_views(model(), CONE, None)
     places = rng.uniform((-40, -30, 380), (40, 30, 480), (5, 3))
     some = spread_hypotheses(views, thin_views(views, 16.0), 45.0, places)
-    return select_hypotheses(some, rng.choice(len(some.orientation), n, replace=False))
+    return selected(some, rng.choice(len(some.orientation), n, replace=False))
 
 
 @pytest.mark.kernel
@@ -249,14 +255,14 @@ def test_scores_are_those_of_the_reference() -> None:
     tangents = rng.normal(size=points.shape)
     tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
     starts = np.arange(n_views + 1, dtype=np.int64) * n
-    of_views = ViewEdges(starts, points, tangents)
+    edges = [read_only(array, array.dtype) for array in (starts, points, tangents)]
     optics = Optics(175.0, 79.3, 44.8, 80.0)
     left, right = rng.integers(0, 256, (2, 90, 160, 8)).astype(np.uint8)
     depth = np.where(rng.random((90, 160)) < 0.8, rng.uniform(380, 480, (90, 160)), 0.0)
     depth = depth.astype(np.float32)
-    edges, surface = np.zeros((2, 12), dtype=np.float32)
+    on_edges, surface = np.zeros((2, 12), dtype=np.float32)
     for span in ((0, 5), (5, 12)):
-        score_edges(some, of_views, 20, EdgeTables(left, right, optics), edges, span)
+        score_edges(some, *edges, 20, EdgeTables(left, right, optics), on_edges, span)
         score_surface(some, points.reshape(-1, n, 3), DepthMap(depth, optics), 30.0, surface, span)
     for h, pose in enumerate(poses_of(some)):
         first = starts[some.view_index[some.orientation[h]]]
@@ -265,12 +271,12 @@ def test_scores_are_those_of_the_reference() -> None:
         expected = reference.edge_score(
             rotation, shift, points[mine], tangents[mine], (left, right), optics
         )
-        assert edges[h] == pytest.approx(expected, abs=0.02)
+        assert on_edges[h] == pytest.approx(expected, abs=0.02)
         expected = reference.surface_score(
             rotation, shift, points[first : first + n], depth, optics, 30.0
         )
         assert surface[h] == pytest.approx(expected, abs=1e-6)
-    assert np.ptp(edges) > 0.0
+    assert np.ptp(on_edges) > 0.0
     assert np.ptp(surface) > 0.0
 
 

@@ -3,30 +3,39 @@ import pytest
 
 from navapp.geometry.transform import RigidTransform, rotation_angle_deg
 from navapp.registration import (
+    RegistrationModel,
     Scene,
-    compute_explained_fraction,
     distinct,
     find_poses,
     is_same_pose,
+)
+from navapp.registration.multi_start import (
+    compute_coverage,
+    compute_explained_fraction,
+    find_distinct,
     make_tilted_starts,
 )
+from navapp.values import BoneModel
 from tests.registration.shapes import (
     TRUE,
     disturbed,
+    facing_points,
     femur,
     femur_for_registration,
+    grid_mesh,
     mean_error_mm,
     seen_scene,
 )
 
 BONE = femur()
 MODEL = femur_for_registration()
+EYE = np.zeros(3)
 SCENE = seen_scene(900, 0.2)
 
 
 def test_the_starts_are_the_pose_and_tilts_about_the_centre() -> None:
     centre = TRUE.apply(MODEL.centre_mm)
-    starts = make_tilted_starts(TRUE, centre, 15.0, 12)
+    starts = make_tilted_starts(TRUE, centre, (15.0, 12))
     assert len(starts) == 13
     assert starts[0] is TRUE
     for start in starts[1:]:
@@ -35,7 +44,7 @@ def test_the_starts_are_the_pose_and_tilts_about_the_centre() -> None:
 
 
 def test_the_tilts_go_in_all_directions() -> None:
-    starts = make_tilted_starts(TRUE, TRUE.apply(MODEL.centre_mm), 15.0, 12)[1:]
+    starts = make_tilted_starts(TRUE, TRUE.apply(MODEL.centre_mm), (15.0, 12))[1:]
     angles = [rotation_angle_deg(a, b) for i, a in enumerate(starts) for b in starts[:i]]
     assert min(angles) > 8.0
     turns = np.array([(s.rotation @ TRUE.rotation.T)[[2, 0, 1], [1, 2, 0]] for s in starts])
@@ -47,6 +56,14 @@ def test_the_same_answer_is_kept_once_and_the_first_stays() -> None:
     shifted, turned = disturbed(MODEL, 0.0, 3.0, 1), disturbed(MODEL, 4.0, 0.0, 1)
     kept = distinct([TRUE, near, shifted, turned, near], MODEL.centre_mm)
     assert [id(k) for k in kept] == [id(TRUE), id(shifted), id(turned)]
+
+
+def test_how_near_repeats_an_earlier_pose_may_be_said() -> None:
+    moved = ((10.0, 0.0), (0.0, 9.0), (20.0, 0.0), (0.0, 90.0), (18.0, 90.0))
+    poses = [TRUE, *(disturbed(MODEL, *one, 1) for one in moved)]
+    rotations = np.array([pose.rotation for pose in poses])
+    centres_mm = np.array([pose.apply(MODEL.centre_mm) for pose in poses])
+    assert find_distinct(rotations, centres_mm, 12.0, 15.0) == [0, 3, 4, 5]
 
 
 def test_sameness_has_its_bounds() -> None:
@@ -62,7 +79,7 @@ def minus_error(pose: RigidTransform) -> float:
 
 def test_candidates_are_distinct_and_the_best_comes_first() -> None:
     centre = TRUE.apply(MODEL.centre_mm)
-    starts = [disturbed(MODEL, 60.0, 5.0, 3), *make_tilted_starts(TRUE, centre, 10.0, 5)]
+    starts = [disturbed(MODEL, 60.0, 5.0, 3), *make_tilted_starts(TRUE, centre, (10.0, 5))]
     found = find_poses(SCENE, MODEL, starts, minus_error)
     scores = [candidate.score for candidate in found]
     assert scores == sorted(scores, reverse=True)
@@ -74,7 +91,7 @@ def test_candidates_are_distinct_and_the_best_comes_first() -> None:
 
 def test_what_a_pose_explains_finds_the_right_one_among_the_candidates() -> None:
     centre = SCENE.points_mm.mean(axis=0)
-    starts = make_tilted_starts(disturbed(MODEL, 25.0, 10.0, 4), centre, 35.0, 14)
+    starts = make_tilted_starts(disturbed(MODEL, 25.0, 10.0, 4), centre, (35.0, 14))
     found = find_poses(seen_scene(900, 0.3, 1, 600), MODEL, starts)
     assert mean_error_mm(found[0].scene_from_bone, BONE) < 1.0
     assert all(0.0 <= candidate.score <= 1.0 for candidate in found)
@@ -88,7 +105,7 @@ def test_a_start_that_pairs_with_nothing_gives_no_candidate() -> None:
 
 def test_two_runs_on_two_threads_are_equal_to_the_last_bit() -> None:
     starts = make_tilted_starts(
-        disturbed(MODEL, 20.0, 8.0, 5), SCENE.points_mm.mean(axis=0), 35.0, 14
+        disturbed(MODEL, 20.0, 8.0, 5), SCENE.points_mm.mean(axis=0), (35.0, 14)
     )
     runs = [find_poses(seen_scene(900, 0.3, 2, 600), MODEL, starts) for _ in range(2)]
     assert len(runs[0]) == len(runs[1]) > 0
@@ -134,3 +151,47 @@ def test_progress_may_stop_the_search() -> None:
     with pytest.raises(StoppedError):
         find_poses(SCENE, MODEL, [TRUE] * 10, minus_error, stop)
     assert len(told) == 2
+
+
+def test_a_bone_that_is_seen_whole_is_covered_at_its_pose() -> None:
+    points = facing_points(femur(), TRUE)
+    assert compute_coverage(Scene(points, EYE), MODEL, TRUE, 0.5) > 0.93
+
+
+def test_half_of_what_should_be_seen_is_half() -> None:
+    points = facing_points(femur(), TRUE)
+    half = points[points[:, 0] < np.median(points[:, 0])]
+    found = compute_coverage(Scene(half, EYE), MODEL, TRUE, 0.5)
+    assert 0.4 < found < 0.68
+
+
+def test_a_wrong_pose_is_covered_less() -> None:
+    scene = seen_scene(1500, 0.3)
+    right = compute_coverage(scene, MODEL, TRUE, 0.75)
+    wrong = [compute_coverage(scene, MODEL, disturbed(MODEL, 30.0, 8.0, s), 0.75) for s in range(4)]
+    assert right > 0.9
+    assert max(wrong) < 0.7
+    assert compute_coverage(scene, MODEL, disturbed(MODEL, 0.0, 300.0, 1), 0.75) == 0.0
+
+
+def test_a_narrow_kernel_asks_for_a_near_surface() -> None:
+    points = facing_points(femur(), TRUE)
+    scene = Scene(points * (1.0 + 2.0 / 470.0), EYE)
+    assert compute_coverage(scene, MODEL, TRUE, 3.0) > 0.9
+    assert compute_coverage(scene, MODEL, TRUE, 0.5) < 0.2
+
+
+def test_a_surface_that_turns_its_back_is_not_covered() -> None:
+    model = RegistrationModel(BoneModel("plate", grid_mesh(lambda x, y: 0.0 * x)))
+    pose = RigidTransform.from_parts(
+        "left_rect", "plate", np.diag([1.0, -1.0, -1.0]), (0.0, 0.0, 400.0)
+    )
+    scene = Scene(pose.apply(model.points_mm), EYE)
+    assert compute_coverage(scene, model, pose, 1.0) == 0.0
+    front = RigidTransform.from_parts("left_rect", "plate", np.eye(3), (0.0, 0.0, 400.0))
+    assert compute_coverage(scene, model, front, 1.0) == 1.0
+
+
+def test_without_a_camera_there_is_no_coverage() -> None:
+    scene = Scene(facing_points(femur(), TRUE))
+    assert compute_coverage(scene, MODEL, TRUE, 0.5) is None

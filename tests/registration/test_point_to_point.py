@@ -13,7 +13,7 @@ from navapp.registration import (
     solve_bimcc_literal,
     solve_icp,
 )
-from navapp.registration.point_to_point import kabsch, prolong_step
+from navapp.registration.point_to_point import prolong_step, solve_sums
 from navapp.values import BoneModel, Reason
 from tests.reference.bimcc_reference import bidirectional_pairs
 from tests.registration.shapes import (
@@ -39,6 +39,14 @@ def a_pose(seed: int, turn: float = 1.5, shift_mm: float = 100.0) -> RigidTransf
     rng = np.random.default_rng(seed)
     rotation = rotation_from_vector(rng.normal(0.0, turn, 3))
     return RigidTransform.from_parts("scene", "femur", rotation, rng.normal(0, shift_mm, 3))
+
+
+def kabsch(
+    a: np.ndarray, b: np.ndarray, weight: np.ndarray, frames: RigidTransform
+) -> RigidTransform:
+    """The solved pose of pairs (N, 3) and their weights (N,)."""
+    a, b = (np.column_stack([points, np.ones(len(points))]) for points in (a, b))
+    return solve_sums((a * weight[:, None]).T @ b, frames)
 
 
 def apart_mm(a: RigidTransform, b: RigidTransform) -> float:

@@ -5,9 +5,7 @@ import pytest
 
 from navapp.geometry.zbuffer import render_rectified
 from navapp.registration import DepthMap, PoseSampler, is_same_pose
-from navapp.registration.depth_map import Optics
-from navapp.registration.pose_sampler import order_evenly
-from navapp.registration.pose_sampler_kernels import SurfacePoints, score_poses
+from navapp.registration.score_kernels import Optics, SurfacePoints, score_poses
 from navapp.values import DisparityMap, Origin
 from tests.reference import pose_sampler_reference as reference
 from tests.registration.shapes import GEOMETRY, TRUE, femur, femur_for_registration
@@ -88,18 +86,6 @@ def test_only_what_is_matched_has_a_depth() -> None:
     expected[5] = expected[0, 0] = 0.0
     np.testing.assert_allclose(depth.depth_mm, expected, rtol=1e-6)
     assert (depth.optics.centre_x_px, depth.optics.centre_y_px) == (540.0, 310.0)
-
-
-def test_any_first_points_are_spread() -> None:
-    points = np.random.default_rng(1).uniform(0, 10, (3000, 3))
-    order = order_evenly(points)
-    assert sorted(order) == list(range(3000))
-    for n in (64, 200):
-        octants = (points[order[:n]] > 5) @ (1, 2, 4)
-        counts = np.bincount(octants, minlength=8)
-        assert counts.min() > 0.6 * n / 8
-    chance = np.bincount((points[:64] > 5) @ (1, 2, 4), minlength=8)
-    assert np.ptp(np.bincount((points[order[:64]] > 5) @ (1, 2, 4), minlength=8)) < np.ptp(chance)
 
 
 @pytest.mark.release

@@ -9,6 +9,7 @@ from navapp.registration import RegistrationModel
 from navapp.tracking.frame import Frame
 from navapp.tracking.surface_meter import Margins, Measurement
 from navapp.values import BoneModel, DisparityMap, Stopwatch
+from tests.registration.kernel_cases import find_vertices
 from tests.registration.shapes import TRUE, as_cloud, grid_mesh
 
 NO_MAP = DisparityMap(*np.empty((2, 0, 0), np.float32), np.empty((0, 0), np.uint8), 0, 0)
@@ -104,7 +105,7 @@ class FakeMeter:
 
     def _is_near(self, points_mm: np.ndarray, pose: RigidTransform) -> np.ndarray:
         at_bone = pose.inverse().apply(points_mm)
-        index, distance_mm = MODEL.nearest(at_bone)
+        index, distance_mm = find_vertices(at_bone, MODEL)
         offset_mm = np.einsum("ij,ij->i", at_bone - MODEL.points_mm[index], MODEL.normals[index])
         return np.isfinite(distance_mm) & (np.abs(offset_mm) < self.REACH_MM)
 

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from navapp.registration.vertex_neighbourhoods import compute_curvature, find_neighbours
+from navapp.geometry.vertex_neighbourhoods import compute_curvature, find_neighbours
 from tests.registration.shapes import ball_mesh, grid_mesh, tube_mesh
 
 NO_FACES = np.empty((0, 3), dtype=np.int32)

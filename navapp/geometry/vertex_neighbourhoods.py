@@ -1,9 +1,10 @@
-"""Neighbours of each model point, and how the surface bends there."""
+"""Neighbours of each point of a surface, and how the surface bends there."""
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from navapp.geometry.mesh_edges import half_edges
 from navapp.geometry.transform import FloatArray
 
 # All chosen. Of a vertex at most; of a point that no edge touches.
@@ -20,7 +21,7 @@ def find_neighbours(points_mm: FloatArray, faces: NDArray[np.int32]) -> NDArray[
     touches.
     """
     n = len(points_mm)
-    pairs = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    pairs = half_edges(faces)
     is_alone = np.ones(n, dtype=bool)
     is_alone[faces.ravel()] = False
     alone = np.flatnonzero(is_alone)

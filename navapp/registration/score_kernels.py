@@ -1,16 +1,57 @@
-"""Compiled scores of hypotheses by look-ups: edges in both pictures, and the measured surface."""
+"""Compiled scores of poses by look-ups: in measured depth, and in the edges of both pictures."""
 
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from navapp.geometry.motion_kernels import move_point, rotate
+from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.transform import FloatArray
-from navapp.registration.depth_map import DepthMap, Optics
+from navapp.values import DisparityMap
 
 # Directions k pi / N_BINS of an edge's normal, which has no sign; chosen: one bit of a byte each.
 N_BINS = 8
+# Of `score_poses`, all chosen; its formula is in docs/how/registration.md, "A bone that is partly
+# buried". Seen under a flatter angle, a point's depth hangs on fractions of a pixel.
+LEAST_COSINE = 0.2
+# Seen through: further away than so many widths of the kernel; fully so by this much more.
+BEHIND_WIDTHS = 2.0
+FULLY_BEHIND_MM = 1.0
+BEHIND_WEIGHT = 2.0
+
+
+class Optics(NamedTuple):
+    """Focal length and centre in pixels of a scaled or cut rectified picture, and the baseline."""
+
+    focal_px: float
+    centre_x_px: float
+    centre_y_px: float
+    baseline_mm: float
+
+
+class DepthMap(NamedTuple):
+    """Measured depth (h, w), 0 where unknown, and the optics of its pixels."""
+
+    depth_mm: NDArray[np.float32]
+    optics: Optics
+
+    @classmethod
+    def of(cls, geometry: RectifiedGeometry, found: DisparityMap) -> Self:
+        """The matched pixels of a map of disparity in a rectified pair."""
+        is_known = found.is_matched & (found.disparity_px > 0.0)
+        depth_mm = np.zeros(found.disparity_px.shape, dtype=np.float32)
+        scale = geometry.focal_px * geometry.baseline_mm
+        np.divide(scale, found.disparity_px, out=depth_mm, where=is_known)
+        centre_px = geometry.centre_x_px - found.x, geometry.centre_y_px - found.y
+        return cls(depth_mm, Optics(geometry.focal_px, *centre_px, geometry.baseline_mm))
+
+
+def scale_optics(geometry: RectifiedGeometry, scale: int) -> Optics:
+    """Optics of pictures made `scale` times smaller: u' = (u + 0.5) / scale - 0.5."""
+    small = geometry.reduced(scale)
+    return Optics(small.focal_px, small.centre_x_px, small.centre_y_px, small.baseline_mm)
 
 
 class Hypotheses(NamedTuple):
@@ -25,14 +66,6 @@ class Hypotheses(NamedTuple):
     position_mm: FloatArray  # (C, 3) in the rectified left camera
 
 
-class ViewEdges(NamedTuple):
-    """Edges of V views, N points together."""
-
-    starts: NDArray[np.int64]  # (V + 1,) where each view's points begin
-    points_mm: FloatArray  # (N, 3)
-    tangents: FloatArray  # (N, 3) unit, along the edge
-
-
 class EdgeTables(NamedTuple):
     """What an edge of each direction finds at each pixel of both pictures, made smaller.
 
@@ -44,15 +77,12 @@ class EdgeTables(NamedTuple):
     optics: Optics
 
 
-@njit(cache=True, nogil=True)
-def rotate(R: FloatArray, vectors: FloatArray, i: int) -> tuple[float, float, float]:
-    """Vector i of (N, 3) after a rotation."""
-    x, y, z = vectors[i, 0], vectors[i, 1], vectors[i, 2]
-    return (
-        R[0, 0] * x + R[0, 1] * y + R[0, 2] * z,
-        R[1, 0] * x + R[1, 1] * y + R[1, 2] * z,
-        R[2, 0] * x + R[2, 1] * y + R[2, 2] * z,
-    )
+class SurfacePoints(NamedTuple):
+    """Points of a model."""
+
+    points_mm: FloatArray  # (N, 3)
+    normals: FloatArray  # (N, 3) unit, outward
+    variance_mm2: FloatArray  # (N,) along the normal
 
 
 @njit(cache=True, nogil=True)
@@ -89,7 +119,9 @@ def response_at(
 @njit(cache=True, nogil=True)
 def score_edges(
     some: Hypotheses,
-    edges: ViewEdges,
+    starts: NDArray[np.int64],
+    edges_mm: FloatArray,
+    tangents: FloatArray,
     n_first: int,
     tables: EdgeTables,
     score: NDArray[np.float32],
@@ -99,7 +131,9 @@ def score_edges(
 
     Args:
         some: H hypotheses.
-        edges: of all views.
+        starts: (V + 1,) where each view's points begin.
+        edges_mm: (N, 3) points on the edges of all views.
+        tangents: (N, 3) unit, along the edge.
         n_first: so many points of a view at most.
         tables: of the pictures.
         score: (H,) in place, 0 to 1; what is outside the pictures counts as 0.
@@ -109,18 +143,17 @@ def score_edges(
     R, t = np.empty((3, 3)), np.empty(3)
     for h in range(span[0], span[1]):
         view = compose_pose(some, h, R, t)
-        first = edges.starts[view]
-        n = min(edges.starts[view + 1] - first, n_first)
+        first = starts[view]
+        n = min(starts[view + 1] - first, n_first)
         total = 0.0
         for i in range(first, first + n):
-            x, y, z = rotate(R, edges.points_mm, i)
-            x, y, z = x + t[0], y + t[1], z + t[2]
+            x, y, z = move_point(R, t, edges_mm, i)
             if z <= 1e-6:
                 continue
             scale = optics.focal_px / z
             u, v = x * scale + optics.centre_x_px, y * scale + optics.centre_y_px
             # Derivatives of the projection along the edge, without their factor f / z.
-            dx, dy, dz = rotate(R, edges.tangents, i)
+            dx, dy, dz = rotate(R, tangents, i)
             along_y = dy - y / z * dz
             total += response_at(tables.left, u, v, -along_y, dx - x / z * dz)
             u -= optics.baseline_mm * scale
@@ -157,8 +190,7 @@ def score_surface(
         points_mm = surface_mm[compose_pose(some, h, R, t)]
         agreeing = 0
         for i in range(n):
-            x, y, z = rotate(R, points_mm, i)
-            x, y, z = x + t[0], y + t[1], z + t[2]
+            x, y, z = move_point(R, t, points_mm, i)
             if z <= 1e-6:
                 continue
             scale = optics.focal_px / z
@@ -170,3 +202,57 @@ def score_surface(
             if behind_mm > -reach_mm:
                 agreeing += 1 if behind_mm <= reach_mm else -1
         score[h] = agreeing / n
+
+
+@njit(cache=True, nogil=True)
+def score_poses(
+    surface: SurfacePoints,
+    n_first: int,
+    rotations: FloatArray,
+    shifts_mm: FloatArray,
+    depth: DepthMap,
+    sigma_mm: float,
+    score: FloatArray,
+    span: tuple[int, int],
+) -> None:
+    """Fraction of a model's seen area that was measured there, less what was seen through.
+
+    The kernel is the fit's own; a point that something nearer hides, or where nothing was measured,
+    counts for nothing.
+
+    Args:
+        surface: the model's.
+        n_first: so many of its points count.
+        rotations: (H, 3, 3) of the poses.
+        shifts_mm: (H, 3).
+        depth: measured.
+        sigma_mm: width of the kernel, along the normal.
+        score: (H,) in place, -2 to 1.
+        span: first and last (exclusive) pose to be done.
+    """
+    depth_mm, optics = depth.depth_mm, depth.optics
+    height, width = depth_mm.shape
+    for k in range(span[0], span[1]):
+        R, t = rotations[k], shifts_mm[k]
+        area, agreeing, behind = 0.0, 0.0, 0.0
+        for i in range(min(n_first, len(surface.points_mm))):
+            x, y, z = move_point(R, t, surface.points_mm, i)
+            normal_x, normal_y, normal_z = rotate(R, surface.normals, i)
+            facing = -x * normal_x - y * normal_y - z * normal_z
+            if z <= 1e-6 or facing <= 0.0:
+                continue
+            cosine = facing / np.sqrt(x * x + y * y + z * z)
+            if cosine < LEAST_COSINE:
+                continue
+            area += cosine
+            u = int(np.floor(optics.focal_px * x / z + optics.centre_x_px + 0.5))
+            v = int(np.floor(optics.focal_px * y / z + optics.centre_y_px + 0.5))
+            if not (0 <= u < width and 0 <= v < height) or depth_mm[v, u] <= 0.0:
+                continue
+            off_mm = (depth_mm[v, u] - z) * cosine
+            kernel_mm2 = sigma_mm * sigma_mm + surface.variance_mm2[i]
+            agreeing += cosine * np.exp(-0.5 * off_mm * off_mm / kernel_mm2)
+            too_far_mm = off_mm - BEHIND_WIDTHS * np.sqrt(kernel_mm2)
+            if too_far_mm > 0.0:
+                behind += cosine * min(too_far_mm / FULLY_BEHIND_MM, 1.0)
+        score[k] = (agreeing - BEHIND_WEIGHT * behind) / area if area > 0.0 else -1.0
