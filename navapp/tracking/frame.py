@@ -38,7 +38,7 @@ class Frame:
     pair: RectifiedPair  # grey pictures, rectified as far around the bone as is looked
     start: RigidTransform  # rectified left camera from bone, expected
     watch: Stopwatch
-    # as `start`, as the motion lets expect; None when nothing is known of it.
+    # as `start`, by the motion or by an earlier answer; None: a jump is not judged.
     predicted: RigidTransform | None = None
     checks: PairChecks | None = None  # of the pair, begun
     # when the rows of the pictures see a moving bone; None where they see it all at once.

@@ -137,7 +137,7 @@ def guided(sequence: Sequence, n_seeds: int) -> None:
         before, after, signed, n_silent = [], [], [], 0
         for scene in sequence.scenes:
             for seed in range(n_seeds):
-                start = disturbed(scene.pose, parts.centre_mm, angle_deg, length_mm, seed)
+                start = disturbed(scene.pose, parts.model.centre_mm, angle_deg, length_mm, seed)
                 frame = Frame(None, scene.pair, start, Stopwatch())
                 fit = parts.find(frame)
                 before.append(tre_mm(start, scene.pose, sequence.mesh))

@@ -58,7 +58,8 @@ class Asked:
 def test_the_best_answer_comes_first_and_a_sure_one_ends_the_search() -> None:
     a, asked = room(), Asked()
     frame = a.frames[0]
-    tracker = BimccTracker(a.rig, a.tracker.model.bone, buried=asked)
+    tracker = BimccTracker(a.rig, a.tracker.model.bone)
+    tracker.buried = asked
     answers = tracker.register(frame, a.prior, GOAL)
     assert answers[0].verdict.status is Status.OK
     assert not asked.frames
