@@ -25,7 +25,7 @@ from navapp.tracking.search.highlights import HighlightSearch
 from navapp.tracking.search.near import NearSearch
 from navapp.tracking.search.whole_view import WholeViewSearch
 from navapp.tracking.settings import TrackerSettings
-from navapp.tracking.surface_meter import NEAR_VIEW, SurfaceMeter
+from navapp.tracking.surface_meter import NEAR_VIEW, WIDE_VIEW, SurfaceMeter
 from navapp.tracking.tracker import Tracker
 from navapp.values import (
     AspectGraph,
@@ -100,14 +100,14 @@ class BimccTracker(Tracker):
         times = frame.times.with_motion_to(self.rectify_pose(pose))
         if times is None:
             return answer
-        again = self.begin(frame.pictures, pose, NEAR_VIEW, frame.watch, times)
-        closer = self._follow(replace(again, predicted=frame.predicted), state, goal)
+        again = self.begin(frame.pictures, pose, NEAR_VIEW, frame.watch, times, frame.predicted)
+        closer = self._follow(again, state, goal)
         return closer if closer.verdict.rank <= verdict.rank else answer
 
     def _follow(self, frame: Frame, state: TrackState, goal: Goal) -> TrackedFrame:
         """The bone near the start of a frame."""
         with self.begin_checks(frame) as checks:
-            frame = replace(frame, checks=checks, on_measured=checks.check)
+            frame = replace(frame, checks=checks)
             if state.is_glossy:
                 # What is mirrored will lead astray again.
                 best = self._judge_matte(frame, frame.start, goal)
@@ -138,8 +138,9 @@ class BimccTracker(Tracker):
         Only around the first place a search goes further off, as `n_searches` asks for.
         """
         for number, place in enumerate(places):
-            there = self.begin(frame.pictures, place, watch=frame.watch, times=frame.times)
-            there = replace(there, predicted=frame.predicted)
+            there = self.begin(
+                frame.pictures, place, WIDE_VIEW, frame.watch, frame.times, frame.predicted
+            )
             fits = self.after_loss.find(there, 0 if number else n_searches)
             best = self.judge_fits(there, fits, goal, best)
             if best.verdict.status is Status.OK:

@@ -43,8 +43,6 @@ class Frame:
     checks: PairChecks | None = None  # of the pair, begun
     # when the rows of the pictures see a moving bone; None where they see it all at once.
     times: RowTimes | None = None
-    # told what is measured on all of the model near `start`, and at which pose.
-    on_measured: OnMeasured = ignore
     # told the fraction done of a long search; what it raises stops the search.
     on_progress: Progress = ignore
 
@@ -75,12 +73,6 @@ class Fit:
     def with_reason(self, reason: Reason) -> "Fit":
         """The same fit with one more reason against its pose."""
         return replace(self, estimate=self.estimate.with_reason(reason))
-
-    def scale_noise(self, variance_ratio: float) -> "Fit":
-        """The fit on the model under another noise; any other fit as it is."""
-        if self.measured.rendered is None or not self.estimate.has_finite_covariance:
-            return self
-        return replace(self, estimate=self.estimate.scale_noise(variance_ratio))
 
     def with_correlated_residuals(self, noise_variance_ratio: float) -> "Fit":
         """The fit on the model, its covariance grown by what its residuals show beyond noise.

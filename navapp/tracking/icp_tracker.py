@@ -72,8 +72,8 @@ class IcpTracker(Tracker):
         expected = self.boxes.starts(left_from_bone, box)[0]
         times = RowTimes.of_pair(self.meter, state, pictures)
         view, margins = (NEAR_VIEW, NEAR_BOX) if is_near else (WIDE_VIEW, WIDE_BOX)
-        frame = self.begin(pictures, expected, view, watch, times)
-        frame = replace(frame, predicted=self.rectify_pose(left_from_bone))
+        predicted = self.rectify_pose(left_from_bone)
+        frame = self.begin(pictures, expected, view, watch, times, predicted)
         with self.begin_checks(frame) if is_near else nullcontext() as checks:
             fits = [self.find_fit(frame, margins)]
             best = self.judge_fits(replace(frame, checks=checks), fits, goal)

@@ -132,7 +132,7 @@ class PoseJudge:
                 estimate = fit.estimate.with_relief(1.0 / noise_variance_ratio)
                 fit = replace(fit, estimate=estimate)
             if "contour" in self._settings.leaves_out:
-                joined = fit.scale_noise(noise_variance_ratio)
+                joined = replace(fit, estimate=fit.estimate.scale_noise(noise_variance_ratio))
             else:
                 joined = self.outline.join(frame.pair, fit, check.coarse_px, noise_variance_ratio)
             if fit.pose.mean_motion_mm(joined.pose, model.hull_mm) > _SAME_VIEW_MM:

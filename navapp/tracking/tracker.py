@@ -143,20 +143,24 @@ class Tracker(ABC):
         margins: Margins = WIDE_VIEW,
         watch: Stopwatch | None = None,
         times: RowTimes | None = None,
+        predicted: RigidTransform | None = None,
     ) -> Frame:
-        """Both pictures, rectified around an expected bone, as at one time if `times` are given."""
+        """Both pictures, rectified around an expected bone, as at one time if `times` are given.
+
+        `predicted` is that of the frame: without it no jump is noticed.
+        """
         watch, start = watch or Stopwatch(), self.rectify_pose(left_from_bone)
         shifts_px = None if times is None else times.find_shifts(start)
         pair = self.meter.rectify(pictures.left, pictures.right, start, margins, shifts_px)
         watch.lap("rectify")
-        return Frame(pictures, pair, start, watch, times=times)
+        return Frame(pictures, pair, start, watch, predicted, times=times)
 
     def begin_predicted(self, pictures: StereoPictures, state: TrackState) -> Frame:
         """Both pictures, rectified around where the motion lets expect the bone."""
         left_from_bone = state.predict(pictures.captured_ns, self.model.centre_mm)
         times = RowTimes.of_pair(self.meter, state, pictures)
-        frame = self.begin(pictures, left_from_bone, NEAR_VIEW, times=times)
-        return replace(frame, predicted=frame.start)
+        predicted = self.rectify_pose(left_from_bone)
+        return self.begin(pictures, left_from_bone, NEAR_VIEW, times=times, predicted=predicted)
 
     def begin_checks(self, frame: Frame) -> PairChecks:
         """Checks of a frame in which the bone is expected near the start, begun at once."""

@@ -54,6 +54,7 @@ from navapp.values import (
     Prior,
     Reason,
     Status,
+    StereoPictures,
     TrackedFrame,
     Verdict,
 )
@@ -118,6 +119,7 @@ class Script:
     calls: list[str] = field(default_factory=list)
     tracks: list[tuple[str, TrackState, Goal]] = field(default_factory=list)
     priors: list[Prior] = field(default_factory=list)
+    pictures: list[StereoPictures] = field(default_factory=list)
     on_track: Callable[[str], object] = lambda bone: None
 
 
@@ -130,6 +132,7 @@ class FakeTracker:
     def register(self, pictures, prior, goal, on_progress=lambda share: None):
         self.script.calls.append(f"register {self.bone.name}")
         self.script.priors.append(prior)
+        self.script.pictures.append(pictures)
         self.script.started.set()
         on_progress(0.5)
         if self.script.gate is not None:
@@ -141,20 +144,22 @@ class FakeTracker:
 
     def track(self, pictures, state: TrackState, goal):
         self.script.calls.append(f"track {self.bone.name}")
-        return self._follow(pictures.captured_ns, state, goal)
+        return self._follow(pictures, state, goal)
 
     def glance(self, pictures, state: TrackState, goal):
         self.script.calls.append(f"glance at {self.bone.name}")
-        return self._follow(pictures.captured_ns, state, goal)
+        return self._follow(pictures, state, goal)
 
-    def _follow(self, captured_ns, state: TrackState, goal):
+    def _follow(self, pictures, state: TrackState, goal):
+        self.script.pictures.append(pictures)
         self.script.tracks.append((self.bone.name, state, goal))
         self.script.on_track(self.bone.name)
         tracked = self.script.tracked_of.get(self.bone.name, self.script.tracked)
-        return tracked, state.update(tracked, captured_ns, np.zeros(3))
+        return tracked, state.update(tracked, pictures.captured_ns, np.zeros(3))
 
     def assess(self, pictures, left_from_bone, goal):
         self.script.calls.append(f"assess {self.bone.name}")
+        self.script.pictures.append(pictures)
         tracked = self.script.assessed
         if tracked.estimate is None:
             return tracked

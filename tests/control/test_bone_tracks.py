@@ -89,3 +89,17 @@ def test_what_is_registered_without_a_review_is_taken_unless_it_is_lost(
     script.found = [answer()]
     tracks.register_now(OPENING, a_frame())
     assert tracks.accepted == ("femur",)
+
+
+def test_trackers_are_handed_the_very_pictures(tracks: BoneTracks, script: Script) -> None:
+    tracker = FakeTracker(script, SimpleNamespace(name="femur"))
+    frames = [a_frame(captured_ns=number * 10**9, sequence=number) for number in range(1, 5)]
+    offered(tracks, answer())
+    tracks.review(OPENING, frames[0])
+    tracks.accept(OPENING)
+    tracks.follow(OPENING, frames[1])
+    tracks.glance(OPENING, frames[2], None, tracker)
+    tracks.propose("femur", a_pose(), 9)
+    tracks.review(OPENING, frames[3])
+    assert [id(one) for one in script.pictures] == [id(frame) for frame in frames]
+    assert script.calls[-1] == "assess femur"

@@ -8,6 +8,7 @@ from navapp.geometry.transform import RigidTransform
 from navapp.geometry.zbuffer import render_rectified
 from navapp.joint.occluded_tracker import OccludedTracker, Occluder
 from navapp.tracking import TrackerSettings, TrackState
+from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.tracking.frame import NOISE_VARIANCE_RATIO
 from navapp.tracking.judging import PoseJudge
 from navapp.values import DisparityMap, Status
@@ -73,6 +74,15 @@ def test_behind_nothing_a_bone_is_judged_as_ever() -> None:
     assert one.verdict.status is Status.OK
     assert other.verdict == one.verdict
     assert (other.estimate.covariance == one.estimate.covariance).all()
+
+
+def test_what_is_left_out_of_the_tracker_is_left_out_behind_the_occluder() -> None:
+    a = room()
+    settings = TrackerSettings(leaves_out=frozenset({"backward pairs"}))
+    tracker = BimccTracker(a.rig, a.tracker.model.bone, settings)
+    far = RigidTransform.from_parts("left", "ball", np.eye(3), (0.0, 0.0, 5000.0))
+    assert hidden_room()[1].model.pairs_backward
+    assert not OccludedTracker(tracker, BALL, far).model.pairs_backward
 
 
 def test_a_spread_makes_the_bound_larger_and_moves_nothing() -> None:

@@ -13,6 +13,7 @@ from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.tracking.first_registration import FirstRegistration
 from navapp.tracking.frame import FREE_SETTINGS, Fit
 from navapp.tracking.judging import PoseJudge
+from navapp.tracking.row_times import RowTimes
 from navapp.tracking.search.near import NearSearch
 from navapp.tracking.surface_meter import WIDE_BOX
 from navapp.values import FrameTimings, Prior, Reason, Status, TrackedFrame, Verdict
@@ -326,11 +327,12 @@ def test_the_time_of_a_frame_is_told_part_by_part() -> None:
 class EqualAnswers:
     """A judge that gives answers of equal worth."""
 
-    def __init__(self, meter) -> None:
-        self.meter, self.answers = meter, []
+    def __init__(self, meter, reason: Reason = Reason.COVERAGE_LOW) -> None:
+        self.meter, self.reason, self.answers, self.fits = meter, reason, [], []
 
     def judge(self, frame, fit, goal):
-        verdict = Verdict(Status.DEGRADED, 1.0, (Reason.COVERAGE_LOW,), coverage=0.3)
+        self.fits.append(fit)
+        verdict = Verdict(Status.DEGRADED, 1.0, (self.reason,), coverage=0.3)
         self.answers.append(TrackedFrame("femur", None, verdict, FrameTimings()))
         return self.answers[-1]
 
@@ -341,6 +343,41 @@ def test_of_equal_answers_the_last_stands() -> None:
     tracker.judge = judge = EqualAnswers(a.tracker.meter)
     frame = tracker.begin(a.frames[0], a.truth(a.frames[0]))
     assert tracker.judge_fits(frame, ["near", "free"], GOAL) is judge.answers[1]
+
+
+def test_what_a_search_for_a_buried_bone_finds_takes_no_place_of_an_equal_answer() -> None:
+    a = room()
+    tracker = BimccTracker(a.rig, a.tracker.model.bone)
+    tracker.judge = judge = EqualAnswers(a.tracker.meter, Reason.SURFACE_MISFIT)
+    tracker.near = SimpleNamespace(find=lambda frame: ["near"])
+    tracker.buried = SimpleNamespace(find=lambda frame: ["buried"])
+    tracker.highlights = SimpleNamespace(find=lambda *given: [])
+    state = TrackState.at_rest(a.truth(a.frames[0]), 0)
+    frame = tracker.begin_predicted(a.frames[0], state)
+    assert tracker._follow(frame, state, GOAL) is judge.answers[0]
+    assert judge.fits == ["near", "buried"]
+
+
+def test_a_frame_that_is_begun_again_keeps_what_was_predicted() -> None:
+    """Else a jump would not be noticed: for rows of another motion, and for a bone searched."""
+    a = room()
+    tracker, begun = BimccTracker(a.rig, a.tracker.model.bone), []
+    whole = tracker.begin
+    tracker.begin = lambda *given, **more: begun.append(whole(*given, **more)) or begun[-1]
+    state = TrackState.at_rest(a.truth(a.frames[0]), 0)
+    frame = replace(a.frames[0], captured_ns=33_000_000)
+    first = tracker.begin_predicted(frame, state)
+    times = SimpleNamespace(
+        with_motion_to=lambda pose: None if pose is None else RowTimes.of_pair(
+            tracker.meter, state, replace(frame, skew_ns=1)
+        )
+    )  # fmt: skip
+    answer = tracker._follow(first, state, GOAL)
+    tracker._follow_closer(replace(first, times=times), answer, state, GOAL)
+    away = a.truth(a.frames[0]).move((4.0, 0, 0, 0, 0, 0), (0.0, 0.0, 0.0))
+    tracker._search_places(first, [away], 0, GOAL, tracker.judge.lost_in(first))
+    assert len(begun) == 3
+    assert all(one.predicted is first.predicted for one in begun[1:])
 
 
 def test_candidates_that_share_a_free_measurement_are_checked_each_at_its_own_pose() -> None:

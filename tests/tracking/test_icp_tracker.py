@@ -164,3 +164,19 @@ def test_it_follows_the_box() -> None:
     shifted = Pictures(left, right, frame.captured_ns + 66_000_000)
     _, state = icp.track(shifted, state, GOAL)
     assert state.box.picture_box.x == pytest.approx(start.x + moved, abs=6.0)
+
+
+def test_the_pose_that_motion_lets_expect_is_what_a_jump_is_measured_from() -> None:
+    """Not the place of the box, at which the fit begins."""
+    a, icp, judged = room(), tracker(), []
+    frame = a.frames[0]
+    state = TrackState.at_rest(a.truth(frame), frame.captured_ns)
+    whole = icp.judge.judge
+    icp.judge.judge = lambda frame, *given: judged.append(frame) or whole(frame, *given)
+    _, state = icp.track(frame, state, GOAL)
+    left, right = (np.roll(eye, 60, axis=1) for eye in (frame.left, frame.right))
+    shifted = Pictures(left, right, frame.captured_ns + 66_000_000)
+    expected = icp.rectify_pose(state.predict(shifted.captured_ns, icp.model.centre_mm))
+    icp.track(shifted, state, GOAL)
+    np.testing.assert_array_equal(judged[-1].predicted.matrix, expected.matrix)
+    assert np.abs(judged[-1].start.matrix - expected.matrix).max() > 1.0

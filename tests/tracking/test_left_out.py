@@ -97,7 +97,7 @@ def test_without_an_outline_a_fit_is_as_with_one_of_which_nothing_is_found(monke
     monkeypatch.setattr(outline, "block", lambda *_: nothing)
     for noise in (1.0, 0.4):
         expected = outline.join(frame.pair, fit, None, noise).estimate
-        found = fit.scale_noise(noise).estimate
+        found = fit.estimate.scale_noise(noise)
         np.testing.assert_array_equal(found.covariance, expected.covariance)
         np.testing.assert_array_equal(found.sized.covariance, expected.sized.covariance)
         np.testing.assert_array_equal(found.sized.step, expected.sized.step)

@@ -59,8 +59,8 @@ def make_starts_after_loss(
     if n_searches % 2 == 0:
         return []
     starts: list[RigidTransform] = []
+    place_mm = last.apply(centre_mm)
     # Tilts of the last pose where it was, and a step away along each axis.
     for step_mm, tilts in _RINGS:
-        place_mm = last.apply(centre_mm)
         starts += make_scattered_starts(last, place_mm, step_mm, tilts, has_middle=not starts)
     return starts[n_searches // 2 % _PARTS :: _PARTS]

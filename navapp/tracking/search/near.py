@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from navapp.geometry.transform import RigidTransform
 from navapp.registration import BimccSettings, fit_bimcc
 from navapp.tracking.following import Follower
-from navapp.tracking.frame import FREE_SETTINGS, Fit, Frame
+from navapp.tracking.frame import FREE_SETTINGS, Fit, Frame, ignore
 from navapp.tracking.surface_meter import NEAR_BOX, Margins, Measurement, SurfaceMeter
 
 _NEARBY_SETTINGS = FREE_SETTINGS._replace(widest_mm=3.0)
@@ -55,10 +55,10 @@ class NearSearch:
                 yield fit
 
     def _rest(self, frame: Frame, *, skips_samples: bool = False) -> Fit | None:
+        told = ignore if frame.checks is None else frame.checks.check
         return self._follower.follow(
-            frame, frame.start, LEAST_FRACTION, skips_samples=skips_samples,
-            on_measured=frame.on_measured,
-        )  # fmt: skip
+            frame, frame.start, LEAST_FRACTION, skips_samples=skips_samples, on_measured=told
+        )
 
     def find_freely(self, frame: Frame, margins: Margins) -> Fit | None:
         """Measure freely around the start, fit, then follow onto the model; None out of view."""

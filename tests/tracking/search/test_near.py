@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -179,7 +180,8 @@ def test_the_margins_of_tracking_and_of_a_first_search_are_kept_apart() -> None:
 
 def test_what_is_measured_next_to_the_expected_pose_is_told() -> None:
     told = []
-    frame = frame_at(TRUE, on_measured=lambda measured, pose: told.append(measured))
+    checks = SimpleNamespace(check=lambda measured, pose: told.append(measured))
+    frame = frame_at(TRUE, checks=checks)
     fit = find(search_of(FakeMeter()), frame)
     assert told[-1] is fit.measured
 
