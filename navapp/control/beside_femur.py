@@ -1,6 +1,5 @@
 """The tibia beside the femur: found from it, followed behind it, and measured against it."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -13,6 +12,7 @@ from navapp.limb import FEMUR, TIBIA, BoneSurface, Hinge, LimbMeasurement, LimbM
 from navapp.tracking import Tracker
 from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.values import Plan, PoseEstimate, StageSpec, TrackedFrame
+from navapp.values.progress import Progress
 
 
 def may_start_from(bone: str, active: str) -> bool:
@@ -112,7 +112,7 @@ class BesideFemur:
         if search is None or not isinstance(tracker, BimccTracker):
             raise ValueError(f"the {stage.bone} is not found from the femur")
 
-        def look(on_progress: Callable[[float], None]) -> FoundBone:
+        def look(on_progress: Progress) -> FoundBone:
             hidden = OccludedTracker(tracker, femur, left_from_femur)
             found = search.find(hidden, frame, left_from_femur, goal, on_progress)
             return FoundBone(

@@ -1,12 +1,12 @@
 """The first registration that runs, if one does."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 from drivers.frames import StereoFrame
 from navapp.control.executors import Executor, Job
 from navapp.control.trackers import Trackers
 from navapp.values import Prior, StageSpec, TrackedFrame
+from navapp.values.progress import Progress
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,7 +48,7 @@ class RegistrationJob:
         if self._job is not None:
             return False
 
-        def search(on_progress: Callable[[float], None]) -> Registration:
+        def search(on_progress: Progress) -> Registration:
             answers = self._trackers.register(stage, frame, on_progress)
             return Registration(answers, frame.captured_ns)
 

@@ -25,6 +25,7 @@ from navapp.values import (
     Status,
     TrackedFrame,
 )
+from navapp.values.progress import Progress
 
 # What is said of a bone that was found, but of which too little is matched.
 _LOOSE = frozenset({Reason.COVERAGE_LOW, Reason.POSE_UNCERTAIN})
@@ -166,7 +167,7 @@ class Trackers:
         self,
         stage: StageSpec,
         frame: StereoFrame,
-        on_progress: Callable[[float], None] = lambda share: None,
+        on_progress: Progress = lambda share: None,
     ) -> list[TrackedFrame]:
         """Search for a stage's bone in a frame; best answer first, empty without any start."""
         start, goal = self.start(stage.bone), self.goal(stage)

@@ -5,7 +5,6 @@ score how much of the view's surface was measured where it should be, and equati
 pictures. The best go through the coarse BiMCC loop and are ranked by what they explain.
 """
 
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
@@ -39,7 +38,7 @@ from navapp.registration.multi_start import (
 from navapp.registration.scene import Scene
 from navapp.registration.score_kernels import Hypotheses, score_edges, score_surface
 from navapp.values import AspectGraph
-from navapp.values.progress import tell_part
+from navapp.values.progress import Progress, tell_part
 
 
 class Level(NamedTuple):
@@ -75,7 +74,7 @@ def find_initial(
     model: RegistrationModel,
     cone: ViewCone,
     aspects: AspectGraph | None = None,
-    on_progress: Callable[[float], None] = lambda fraction: None,
+    on_progress: Progress = lambda fraction: None,
 ) -> list[ScoredPose]:
     """Find a bone in a box without a pose: distinct poses, best first.
 
@@ -93,14 +92,14 @@ def find_initial(
     views = make_views(model, cone, aspects)
     rotations, shifts_mm = compute_poses(_rank_hypotheses(pair, scene, views, on_progress))
     centres_mm = rotations @ model.centre_mm + shifts_mm
-    distinct = find_distinct(rotations, centres_mm, _SAME_START_MM, _SAME_START_DEG)[:_N_FITTED]
+    distinct = find_distinct(rotations, centres_mm, _SAME_START_MM, _SAME_START_DEG, _N_FITTED)
     frames = pair.geometry.rectified_from_left.target, model.bone.name
     starts = [RigidTransform.from_parts(*frames, rotations[k], shifts_mm[k]) for k in distinct]
     return _fit_starts(pair.geometry, scene, model, starts, on_progress)
 
 
 def _rank_hypotheses(
-    pair: RectifiedPair, scene: Scene, views: Views, on_progress: Callable[[float], None]
+    pair: RectifiedPair, scene: Scene, views: Views, on_progress: Progress
 ) -> Hypotheses:
     """The refined hypotheses, best first."""
     chosen = thin_views(views, _COARSE_STEP_DEG)
@@ -137,7 +136,7 @@ def _fit_starts(
     scene: Scene,
     model: RegistrationModel,
     starts: list[RigidTransform],
-    on_progress: Callable[[float], None],
+    on_progress: Progress,
 ) -> list[ScoredPose]:
     """What the coarse loop finds from each start, on the scene around it: distinct, best first."""
     _ = model.arrays  # made here once, not in both threads

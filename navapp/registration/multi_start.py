@@ -22,6 +22,7 @@ from navapp.registration.pairing_kernels import (
 from navapp.registration.scene import Scene
 from navapp.registration.step_kernels import weigh
 from navapp.values import PoseEstimate, Reason
+from navapp.values.progress import Progress
 
 # All chosen; the starts for rough poses 15 deg and 20 mm off.
 # Poses nearer than this are the same answer.
@@ -119,7 +120,7 @@ def find_poses(
     model: RegistrationModel,
     starts: Sequence[RigidTransform],
     score: Callable[[RigidTransform], float] | None = None,
-    on_progress: Callable[[float], None] = lambda fraction: None,
+    on_progress: Progress = lambda fraction: None,
     settings: BimccSettings = NEAR_SETTINGS,
 ) -> list[ScoredPose]:
     """Fit coarsely from every start (`scene_from_bone`); distinct answers, best score first.
@@ -221,14 +222,17 @@ def distinct(
     """The first n that repeat no earlier one; `centre_mm` (3,) in the bone's frame."""
     rotations = np.array([pose.rotation for pose in poses])
     centres_mm = np.array([pose.apply(centre_mm) for pose in poses])
-    kept = find_distinct(rotations, centres_mm, _SAME_MM, _SAME_DEG)
-    return [poses[k] for k in kept[:n]]
+    return [poses[k] for k in find_distinct(rotations, centres_mm, _SAME_MM, _SAME_DEG, n)]
 
 
 def find_distinct(
-    rotations: FloatArray, centres_mm: FloatArray, same_mm: float, same_deg: float
+    rotations: FloatArray,
+    centres_mm: FloatArray,
+    same_mm: float,
+    same_deg: float,
+    n: int | None = None,
 ) -> list[int]:
-    """Indices of poses that repeat none before them, in their order.
+    """Indices of the first n poses that repeat none before them, in their order; of all for None.
 
     Two poses are the same when they differ by no more than `same_deg` in their rotations (H, 3, 3)
     and `same_mm` in where they put the bone's centre, (H, 3).
@@ -236,7 +240,7 @@ def find_distinct(
     least_trace = 1.0 + 2.0 * np.cos(np.radians(same_deg))
     left = np.arange(len(rotations))
     kept: list[int] = []
-    while len(left):
+    while len(left) and len(kept) != n:
         first = int(left[0])
         kept.append(first)
         trace = np.einsum("hij,ij->h", rotations[left], rotations[first])

@@ -7,7 +7,6 @@ a rough one, then ever closer around the best (annealing), at last around each d
 (cross-entropy).
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
@@ -20,6 +19,7 @@ from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.registration.model import RegistrationModel
 from navapp.registration.multi_start import ScoredPose, distinct
 from navapp.registration.score_kernels import DepthMap, SurfacePoints, score_poses
+from navapp.values.progress import Progress
 
 # All settings below are chosen. Always the same draws: the same pictures give the same pose.
 _SEED = 20
@@ -80,7 +80,7 @@ class PoseSampler:
         depth: DepthMap,
         rough: RigidTransform,
         n: int,
-        on_progress: Callable[[float], None] = lambda fraction: None,
+        on_progress: Progress = lambda fraction: None,
     ) -> list[ScoredPose]:
         """At most n distinct poses around a rough one (camera from bone), best first.
 
@@ -141,15 +141,15 @@ class PoseSampler:
         mean, covariance = np.zeros(6), np.diag(draw.deviations**2)
         floor = np.diag(np.repeat([_LEAST_MM, _LEAST_RAD], 3) ** 2)
         rotation, centre_mm = np.array(start.rotation), start.apply(self._centre_mm)
-        score = -1.0
+        scores = np.full(1, -1.0)
         for sigma_mm in sigmas_mm:
             twists = random.multivariate_normal(mean, covariance, draw.n_poses, method="cholesky")
             twists[0] = mean
             moved = self._move(rotation, centre_mm, twists)
-            best, score = self._find_best(depth, moved, draw, sigma_mm)
+            best, scores = self._find_best(depth, moved, draw, sigma_mm)
             mean = twists[best].mean(axis=0)
             covariance = _WIDENING**2 * np.cov(twists[best].T) + floor
-        return ScoredPose(start.move(mean, centre_mm), score)
+        return ScoredPose(start.move(mean, centre_mm), float(scores[0]))
 
     def _move(
         self, rotations: FloatArray, centres_mm: FloatArray, twists: FloatArray
@@ -162,10 +162,10 @@ class PoseSampler:
 
     def _find_best(
         self, depth: DepthMap, poses: tuple[FloatArray, FloatArray], draw: Draw, sigma_mm: float
-    ) -> tuple[NDArray[np.intp], float]:
-        """Indices of the poses to keep, best first, and the best one's score."""
+    ) -> tuple[NDArray[np.intp], FloatArray]:
+        """Indices and scores of the poses to keep, best first."""
         scores = np.empty(len(poses[0]))
         fixed = self._surface, draw.n_points, *poses, depth, sigma_mm, scores
         in_row_bands(len(scores), partial(score_poses, *fixed))
         best = np.argsort(-scores, kind="stable")[: draw.n_kept]
-        return best, float(scores[best[0]])
+        return best, scores[best]

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from navapp.geometry.rectification import RectifiedPair
 from navapp.stereo.coarse import LEAST_AGREEMENT, CoarseMatch, clip_box, smooth_steps
-from navapp.stereo.matching.census_sgm import CensusSettings, OtherView, match_census
+from navapp.stereo.matching.census_sgm import CensusSettings, FillEvidence, match_census
 from navapp.stereo.matching.gradient import match_gradient, smooth_known
 from navapp.stereo.occlusion.classify import classify, project_to_right
 from navapp.stereo.occlusion.wls_fill import FillSettings, fill_wls
@@ -89,7 +89,7 @@ def match_surface(
     surface_px = coarse.at_full(smooth_steps(found.left.disparity_px), pair.box)
     left = refine_surface(pair, surface_px)
     fill = FillSettings(max_gap_px=max_gap_px) if fills else None
-    return _answer(pair, left, coarse.other_view(pair.box), fill, watch)
+    return _answer(pair, left, coarse.fill_evidence(pair.box), fill, watch)
 
 
 def match_on_support(
@@ -116,9 +116,9 @@ def match_on_support(
         return StereoAnswer(left, left, (), watch.timings)
     # What the right camera sees of the support is all that is known of its view.
     right_px = project_to_right(support_px, left.x, pair.geometry.width)
-    other = OtherView(right_px, 0, _by_sigma(left))
+    evidence = FillEvidence(right_px, 0, _by_sigma(left))
     fill = FillSettings(max_gap_px=max_gap_px)
-    return _answer(pair, left, other, fill, watch, np.isfinite(support_px))
+    return _answer(pair, left, evidence, fill, watch, np.isfinite(support_px))
 
 
 def match_baseline(
@@ -150,7 +150,7 @@ def match_baseline(
 def _answer(
     pair: RectifiedPair,
     left: DisparityMap,
-    other: OtherView,
+    evidence: FillEvidence,
     fill: FillSettings | None,
     watch: Stopwatch,
     is_expected: NDArray[np.bool_] | None = None,
@@ -160,10 +160,10 @@ def _answer(
     if fill is None:
         return StereoAnswer(left, left, (), watch.timings)
     picture = pair.left[pair.box.slices]
-    classes = classify(left, other.right_px, other.right_x0, pair.geometry.width, picture)
+    classes = classify(left, evidence.right_px, evidence.right_x0, pair.geometry.width, picture)
     if is_expected is not None:
         classes[~is_expected] = 0
-    filled = fill_wls(left, picture, other.confidence, classes, fill)
+    filled = fill_wls(left, picture, evidence.confidence, classes, fill)
     watch.lap("fill")
     return StereoAnswer(filled, left, (), watch.timings)
 

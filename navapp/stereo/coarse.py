@@ -17,7 +17,7 @@ from navapp.geometry.rectification import Image, RectifiedPair, find_reached
 from navapp.geometry.resampling import TAPS_PX
 from navapp.stereo.matching.census_sgm import (
     CensusSettings,
-    OtherView,
+    FillEvidence,
     TwoViewDisparity,
     match_census,
 )
@@ -66,14 +66,14 @@ class CoarseMatch:
         """A surface of these matches at full resolution, over the box that was asked for."""
         return double_disparity(surface_px, box) if self.is_half else surface_px
 
-    def other_view(self, box: Box) -> OtherView:
+    def fill_evidence(self, box: Box) -> FillEvidence:
         """What a fill at full resolution asks, over the box that was asked for."""
         found = self.found
         if not self.is_half:
             return found
         right = replace(box, x=2 * found.right_x0, width=2 * found.right_px.shape[1])
         right_px = np.float32(2.0) * double(found.right_px, right)
-        return OtherView(right_px, right.x, double(found.confidence, box))
+        return FillEvidence(right_px, right.x, double(found.confidence, box))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

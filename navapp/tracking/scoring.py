@@ -1,6 +1,6 @@
 """How much of the model a fit explains: what decides between two of them."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from navapp.geometry.transform import RigidTransform
 from navapp.registration import ScoredPose, find_poses, rank_fits
@@ -8,6 +8,7 @@ from navapp.registration.verdict import Agreement, is_bone_absent
 from navapp.tracking.agreement import compare
 from navapp.tracking.frame import Fit, ignore
 from navapp.tracking.surface_meter import Measurement, SurfaceMeter
+from navapp.values.progress import Progress
 
 
 class FitScorer:
@@ -37,7 +38,7 @@ class FitScorer:
         self,
         measured: Measurement,
         starts: Sequence[RigidTransform],
-        on_progress: Callable[[float], None] = ignore,
+        on_progress: Progress = ignore,
     ) -> list[ScoredPose]:
         """Distinct poses that starts lead to on a measured surface, by what they explain of it."""
         return find_poses(

@@ -85,9 +85,8 @@ class SlowFill:
                 continue
             if abs(d - layer) >= self.settings.layer_px + self.settings.layer_growth * abs(dx):
                 continue
-            colour = 3.0 * abs(self.picture[v, u] - self.picture[y, x])
             far = (math.hypot(dx, dy) - nearest) / (0.4 * self.radius)
-            far += colour / self.settings.colour_scale
+            far += abs(self.picture[v, u] - self.picture[y, x]) / self.settings.grey_scale
             weight = (0.05 + self.confidence[v, u]) * max(1.0 - far / 64.0, 0.3) ** 64
             equations.append((weight, dx, dy, d))
         if sum(weight for weight, *_ in equations) <= 0.0:

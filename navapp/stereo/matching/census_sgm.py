@@ -71,7 +71,7 @@ class CensusSettings:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class OtherView:
+class FillEvidence:
     """What a fill asks besides the left map: the right view, and trust in the left one."""
 
     # (h, W) float32 disparity of the right view, whole pixels, NaN unknown; rows of the box.
@@ -84,7 +84,7 @@ class OtherView:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TwoViewDisparity(OtherView):
+class TwoViewDisparity(FillEvidence):
     """What one aggregated cost says about both views."""
 
     # over the pair's box; only consistent pixels are matched, nothing is filled.

@@ -26,9 +26,10 @@ _JUMP_PX = 2.0
 _ZONE_PX = 3
 _SAMPLE_PX = 6
 _MIN_SAMPLES = 3
-# Pixels differ enough at this sum of three equal channels; moving the edge costs this per pixel.
-_LARGEST_COLOUR = 90
-_STAY = 20
+# Pixels that differ by more grey levels do not differ any more; what a grey level costs, and what
+# moving the edge by a pixel does.
+_LARGEST_GREY = 30
+_PER_GREY, _STAY = 3, 20
 
 
 @njit(cache=True, nogil=True)
@@ -141,12 +142,12 @@ def _best_split(row: NDArray[np.uint8], x: int, samples: NDArray[np.int64]) -> i
     """Number of pixels from x on that resemble what is left of x more than the samples."""
     best, best_cost, cost = 0, 0, 0
     for k in range(_ZONE_PX):
-        to_object = to_background = _LARGEST_COLOUR
+        to_object = to_background = _LARGEST_GREY
         for i in range(len(samples)):
             to_object = min(to_object, _difference(row, x + k, samples[i]))
         for u in range(max(x - _SAMPLE_PX, 0), x):
             to_background = min(to_background, _difference(row, x + k, u))
-        cost += to_background - to_object + _STAY
+        cost += _PER_GREY * (to_background - to_object) + _STAY
         if cost < best_cost:
             best, best_cost = k + 1, cost
     return best
@@ -154,8 +155,8 @@ def _best_split(row: NDArray[np.uint8], x: int, samples: NDArray[np.int64]) -> i
 
 @njit(cache=True, nogil=True)
 def _difference(row: NDArray[np.uint8], u: int, v: int) -> int:
-    """Sum of the absolute differences of three equal channels."""
-    return int(3 * abs(np.int64(row[u]) - np.int64(row[v])))
+    """Grey levels between two pixels of a row."""
+    return int(abs(np.int64(row[u]) - np.int64(row[v])))
 
 
 @njit(cache=True, nogil=True)

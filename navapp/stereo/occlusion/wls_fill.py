@@ -2,7 +2,7 @@
 
 In the left view an interior occlusion continues what stands on its left, a border occlusion what
 stands on its right. A plane is fitted to matched pixels of that side: near the gap, of the
-background's layer, of similar colour, and confident. Only measured pixels speak, so no error is
+background's layer, of similar brightness, and confident. Only measured pixels speak, so no error is
 carried along a gap and rows can be filled in any order.
 
 Every other row is fitted, the sparser the further from what was measured; a row between two
@@ -44,8 +44,7 @@ class FillSettings:
     radius_px: int | None = None
     # a pixel further from its permitted neighbour stays unknown; None: the width of the map.
     max_gap_px: int | None = None
-    # sum of the differences of three equal channels at which a pixel's weight is 1/e.
-    colour_scale: float = 18.0
+    grey_scale: float = 6.0  # difference in grey levels at which a pixel's weight is 1/e
     layer_px: float = 3.0  # support differs from the permitted neighbour by less than this ...
     layer_growth: float = 0.15  # ... and this per px of distance
     # variance of the support's places at which half of the slope is believed; a slope is dangerous
@@ -155,6 +154,6 @@ def _rules(scene: Scene, settings: FillSettings) -> Rules:
         layer_px=np.float32(settings.layer_px),
         layer_growth=np.float32(settings.layer_growth),
         slope_penalty_px2=np.float32(settings.slope_penalty_px2),
-        per_colour=np.float32(1.0 / settings.colour_scale),
+        per_grey=np.float32(1.0 / settings.grey_scale),
         per_px=np.float32(1.0 / (_DISTANCE_PER_RADIUS * radius)),
     )

@@ -44,7 +44,7 @@ class Rules(NamedTuple):
     layer_px: np.float32
     layer_growth: np.float32
     slope_penalty_px2: np.float32
-    per_colour: np.float32
+    per_grey: np.float32
     per_px: np.float32
 
 
@@ -169,21 +169,20 @@ def _add_row(
 ) -> None:
     """Add the support of one row to the normal equations of all lanes.
 
-    The weight falls with colour and distance, from the nearest that may speak; (1 - f / 64) ** 64
-    is exp(-f) but for its tail, where nothing weighs, and much faster. It stays above what
-    float32 can hold.
+    The weight falls with the difference in grey levels and with distance, from the nearest that may
+    speak; (1 - f / 64) ** 64 is exp(-f) but for its tail, where nothing weighs, and much faster. It
+    stays above what float32 can hold.
     """
     zero, one, part = np.float32(0.0), np.float32(1.0), np.float32(1.0 / 64.0)
-    least, three = np.float32(0.3), np.float32(3.0)
-    per_colour, per_px = rules.per_colour, rules.per_px
+    least, per_grey, per_px = np.float32(0.3), rules.per_grey, rules.per_px
     layer_px, layer_growth = rules.layer_px, rules.layer_growth
     for i in range(among[0], among[1]):
         u, value, trust, grey = places[i, 0], places[i, 1], places[i, 2], places[i, 3]
         for k in range(_LANES):
             dx = u - state[_X + k]
             d = value - state[_LAYER + k]
-            colour = three * abs(grey - state[_GREY + k])
-            far = per_colour * colour + per_px * np.sqrt(dx * dx + dy * dy) - state[_NEAR + k]
+            other = per_grey * abs(grey - state[_GREY + k])
+            far = other + per_px * np.sqrt(dx * dx + dy * dy) - state[_NEAR + k]
             w = one - part * far
             w = w if w > least else least
             w = w * w

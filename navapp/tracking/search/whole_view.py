@@ -1,7 +1,5 @@
 """The search for a bone without a pose: in an operator's box, or in the whole view."""
 
-from collections.abc import Callable
-
 import numpy as np
 
 from navapp.geometry.box import Box
@@ -11,6 +9,7 @@ from navapp.registration import Scene, ScoredPose, find_initial
 from navapp.stereo import match_surface
 from navapp.tracking.surface_meter import FREE_CORRELATION_PX, SurfaceMeter
 from navapp.values import AspectGraph, Prior
+from navapp.values.progress import Progress
 
 # All chosen. An operator's box may cut the bone: so much of its size is added on each side.
 _SPARE_FRACTION = 0.15
@@ -34,7 +33,7 @@ class WholeViewSearch:
         return self._meter.rectifier.rectify(luma(left), luma(right), self._box(prior))
 
     def find_poses(
-        self, pair: RectifiedPair, prior: Prior, on_progress: Callable[[float], None]
+        self, pair: RectifiedPair, prior: Prior, on_progress: Progress
     ) -> list[ScoredPose]:
         """Where the bone may be: rectified left camera from bone, best first.
 

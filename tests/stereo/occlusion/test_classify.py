@@ -85,7 +85,7 @@ def right_view_as_seen() -> np.ndarray:
 
 
 def without_edges() -> np.ndarray:
-    """A picture whose colour tells nothing."""
+    """A picture that tells nothing."""
     return np.full((HEIGHT, WIDTH), 90, dtype=np.uint8)
 
 

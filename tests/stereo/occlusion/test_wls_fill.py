@@ -92,7 +92,7 @@ def test_the_class_decides_which_side_speaks(label: Origin, expected: float) -> 
     assert (after.origin[gap] == label).all()
 
 
-def test_similar_colours_speak_louder() -> None:
+def test_similar_grey_levels_speak_louder() -> None:
     before, gap = three_parts()
     before.disparity_px[:10, :25] = 11.5
     picture = np.full(gap.shape, 40, dtype=np.uint8)
