@@ -160,7 +160,7 @@ def _answer(
     if fill is None:
         return StereoAnswer(left, left, (), watch.timings)
     picture = pair.left[pair.box.slices]
-    classes = classify(left, evidence.right_px, evidence.right_x0, pair.geometry.width, picture)
+    classes = classify(left, evidence.right_px, evidence.right_x0, pair.geometry.width)
     if is_expected is not None:
         classes[~is_expected] = 0
     filled = fill_wls(left, picture, evidence.confidence, classes, fill)

@@ -63,9 +63,9 @@ def match_nearer(coarse: CoarseMap, nearer: NearerSearch) -> CoarseMap:
 def fill_surroundings(coarse: CoarseMap) -> Surroundings:
     """The matches of a coarse map, their gaps filled by weighted least squares.
 
-    A match that hangs over the edge of something near is withdrawn, gaps are classified and filled
-    (`fill_gaps`), and filled pixels nearer than their occlusion allows become unknown
-    (`drop_beyond_bound`). A filled pixel has its class as origin: its disparity is a guess.
+    Gaps are classified and filled (`fill_gaps`), and filled pixels nearer than their occlusion
+    allows become unknown (`drop_beyond_bound`). A filled pixel has its class as origin: its
+    disparity is a guess.
     """
     matched = coarse.matched
     if matched is None:
@@ -75,7 +75,7 @@ def fill_surroundings(coarse: CoarseMap) -> Surroundings:
     pair, found = matched.pair, matched.found
     # The half of an odd picture lacks its last column or row, the half of a box has it.
     picture = crop(pair.left, pair.box, (0, 0))
-    classes = classify(found.left, found.right_px, found.right_x0, pair.geometry.width, picture)
+    classes = classify(found.left, found.right_px, found.right_x0, pair.geometry.width)
     disparity_px, origin = fill_gaps(found.left, picture, found.confidence, classes, _FILL)
     drop_beyond_bound(disparity_px, origin, _EDGE_PX, _LAYER_PX)
     return Surroundings(disparity_px, origin, coarse.box, matched.is_half, picture)

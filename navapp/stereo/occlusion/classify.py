@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from navapp.geometry.bands import run_both
 from navapp.stereo.occlusion.classify_kernels import (
     class_rows,
-    edge_splits,
     find_begins,
     mark_seen,
     project_rows,
@@ -27,7 +26,6 @@ def classify(
     right_px: NDArray[np.float32],
     right_x0: int,
     picture_width: int,
-    picture: NDArray[np.uint8],
 ) -> NDArray[np.uint8]:
     """Class of every pixel that is not, or not believably, matched.
 
@@ -36,34 +34,27 @@ def classify(
         right_px: (h, W) float32 disparity of the right view in the same rows, NaN where unknown.
         right_x0: column of its first pixel in the rectified right picture.
         picture_width: of the rectified pictures.
-        picture: (h, w) rectified grey left picture over the map. Matches at the left edge of near
-            objects that look like the background are withdrawn: a matching window hangs over the
-            edge and gives the background the object's disparity.
 
     Returns:
         (h, w) 0 where the match stands and outside the picture, else the `Origin` that a filled
         pixel gets. A class on a matched pixel withdraws that match.
 
     Raises:
-        ValueError: another number of rows, or a picture of another size.
+        ValueError: another number of rows.
 
     Source: the paper, section 3.2 (border and non-border occlusions).
     """
     shape = left.disparity_px.shape
     if right_px.shape[0] != shape[0]:
         raise ValueError("classify needs both views over the same rows")
-    if picture.shape != shape:
-        raise ValueError("the picture must be grey and over the map's box")
     disparity = np.ascontiguousarray(left.disparity_px, dtype=np.float32)
     origin = np.ascontiguousarray(left.origin)
     right_px = np.ascontiguousarray(right_px, dtype=np.float32)
-    grey = np.ascontiguousarray(picture)
     seen, begins = np.empty(shape, dtype=bool), np.empty(shape[0], dtype=np.int64)
     in_two_shares(lambda *rows: mark_seen(right_px, right_x0 - left.x, *rows, seen))
     find_begins(disparity, origin, left.x, begins)
-    splits, classes = np.empty(shape, dtype=np.int8), np.empty(shape, dtype=np.uint8)
-    in_two_shares(lambda *rows: edge_splits(disparity, origin, begins, grey, *rows, splits))
-    in_two_shares(lambda *rows: class_rows(disparity, origin, begins, seen, splits, *rows, classes))
+    classes = np.empty(shape, dtype=np.uint8)
+    in_two_shares(lambda *rows: class_rows(disparity, origin, begins, seen, *rows, classes))
     classes[:, : max(-left.x, 0)] = 0
     classes[:, max(picture_width - left.x, 0) :] = 0
     return classes

@@ -20,17 +20,6 @@ _STRIP_SLACK_PX = 8.0
 # The strip's end is agreed over this many rows above and below.
 _STRIP_ROWS = 4
 
-# Left edges of near objects: the smallest jump, how many pixels right of it may belong to the
-# background, and how many on either side show what background and object look like.
-_JUMP_PX = 2.0
-_ZONE_PX = 3
-_SAMPLE_PX = 6
-_MIN_SAMPLES = 3
-# Pixels that differ by more grey levels do not differ any more; what a grey level costs, and what
-# moving the edge by a pixel does.
-_LARGEST_GREY = 30
-_PER_GREY, _STAY = 3, 20
-
 
 @njit(cache=True, nogil=True)
 def mark_seen(
@@ -95,77 +84,11 @@ def find_begins(
 
 
 @njit(cache=True, nogil=True)
-def edge_splits(
-    disparity: NDArray[np.float32],
-    origin: NDArray[np.uint8],
-    begins: NDArray[np.int64],
-    picture: NDArray[np.uint8],
-    first: int,
-    step: int,
-    splits: NDArray[np.int8],
-) -> None:
-    """How many pixels right of each jump to something nearer look like the background.
-
-    Args:
-        disparity: (h, w) px; read where matched.
-        origin: (h, w) of the matches.
-        begins: (h,) first column whose matches count.
-        picture: (h, w) grey.
-        first: row.
-        step: between rows.
-        splits: (h, w) in place: at the first pixel right of a jump; -1 elsewhere.
-    """
-    height, width = disparity.shape
-    samples = np.empty(_SAMPLE_PX, np.int64)
-    for y in range(first, height, step):
-        splits[y] = -1
-        previous = -1
-        for x in range(begins[y], width):
-            if origin[y, x] != _MATCHED:
-                continue
-            is_jump = previous >= 0 and disparity[y, x] - disparity[y, previous] >= _JUMP_PX
-            previous = x
-            if not is_jump or x < _MIN_SAMPLES:
-                continue
-            n = 0
-            for u in range(x + _ZONE_PX, min(x + _ZONE_PX + _SAMPLE_PX, width)):
-                is_matched = origin[y, u] == _MATCHED
-                if is_matched and abs(disparity[y, u] - disparity[y, x]) < _JUMP_PX:
-                    samples[n] = u
-                    n += 1
-            if n >= _MIN_SAMPLES:
-                splits[y, x] = _best_split(picture[y], x, samples[:n])
-
-
-@njit(cache=True, nogil=True)
-def _best_split(row: NDArray[np.uint8], x: int, samples: NDArray[np.int64]) -> int:
-    """Number of pixels from x on that resemble what is left of x more than the samples."""
-    best, best_cost, cost = 0, 0, 0
-    for k in range(_ZONE_PX):
-        to_object = to_background = _LARGEST_GREY
-        for i in range(len(samples)):
-            to_object = min(to_object, _difference(row, x + k, samples[i]))
-        for u in range(max(x - _SAMPLE_PX, 0), x):
-            to_background = min(to_background, _difference(row, x + k, u))
-        cost += _PER_GREY * (to_background - to_object) + _STAY
-        if cost < best_cost:
-            best, best_cost = k + 1, cost
-    return best
-
-
-@njit(cache=True, nogil=True)
-def _difference(row: NDArray[np.uint8], u: int, v: int) -> int:
-    """Grey levels between two pixels of a row."""
-    return int(abs(np.int64(row[u]) - np.int64(row[v])))
-
-
-@njit(cache=True, nogil=True)
 def class_rows(
     disparity: NDArray[np.float32],
     origin: NDArray[np.uint8],
     begins: NDArray[np.int64],
     seen: NDArray[np.bool_],
-    splits: NDArray[np.int8],
     first: int,
     step: int,
     classes: NDArray[np.uint8],
@@ -177,7 +100,6 @@ def class_rows(
         origin: (h, w) of the matches.
         begins: (h,) where the border strip ends.
         seen: (h, w) of `mark_seen`.
-        splits: (h, w) of `edge_splits`.
         first: row.
         step: between rows.
         classes: (h, w) in place; 0 where a match stands.
@@ -192,27 +114,7 @@ def class_rows(
                 row[x] = 0
             else:
                 row[x] = _MISMATCH if seen[y, x] else _INTERIOR
-        for x in range(begins[y], width):
-            if splits[y, x] >= 0:
-                for u in range(x, min(x + _find_agreed_split(splits, y, x), width)):
-                    row[u] = _INTERIOR if row[u] == 0 else row[u]
         _keep_possible(disparity[y], row)
-
-
-@njit(cache=True, nogil=True)
-def _find_agreed_split(splits: NDArray[np.int8], y: int, x: int) -> int:
-    """Median of the splits beside one (two columns, two rows to every side), rounded down.
-
-    One row alone is moved by noise: without another nearby nothing is split off.
-    """
-    height, width = splits.shape
-    near, n = np.empty(25, np.int64), 0
-    for v in range(max(y - 2, 0), min(y + 3, height)):
-        for u in range(max(x - 2, 0), min(x + 3, width)):
-            if splits[v, u] >= 0:
-                near[n] = splits[v, u]
-                n += 1
-    return 0 if n == 1 else int(np.median(near[:n]))
 
 
 @njit(cache=True, nogil=True)

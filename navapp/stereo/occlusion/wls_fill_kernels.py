@@ -1,101 +1,71 @@
-"""Compiled occlusion filling: who may speak for a pixel, and what lies between fitted pixels.
+"""Compiled occlusion filling: planes fitted to what may speak for short pieces of a row."""
 
-Only what was measured speaks, so fitted rows are independent; the rows between them read those.
-"""
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from navapp.stereo.occlusion.wls_fit_kernels import (
-    N_STATE,
-    Rules,
-    Scene,
-    Support,
-    fit,
-    nearest,
-)
-
 # Of `values.Origin`, as numbers for compiled code.
 _BORDER, _INTERIOR, _MISMATCH = 2, 3, 4
-# Far from what was measured a fit changes slowly: one fitted pixel every so many.
-_GAP_PER_SPACING, _WIDEST_SPACING_PX = 2, 8
-# Fitted rows that differ by less than this show the same surface.
-_SAME_PX = np.float32(1.0)
+# Even a match without confidence tells something.
+_LEAST_TRUST = 0.05
+# A fitted slope may lead this far beyond what was measured.
+_BEYOND_PX = 1.0
+# One plane fills at most so many pixels of a row.
+_PIECE_PX = 16
+# Every so many-th pixel of the support is asked: neighbours tell nearly the same.
+_STRIDE_PX = 3
+
+
+class Scene(NamedTuple):
+    """What is filled, (h, w) each."""
+
+    disparity: NDArray[np.float32]  # px; read where matched
+    classes: NDArray[np.uint8]  # of `occlusion.classify`
+    is_support: NDArray[np.bool_]  # matches that stand
+    picture: NDArray[np.uint8]  # grey
+    confidence: NDArray[np.float32]
+
+
+class Rules(NamedTuple):
+    """How the fit works; see `FillSettings`."""
+
+    radius_px: int
+    rows: int  # of support above and below
+    max_gap_px: int
+    distance_px: float  # at which a pixel's weight is 1/e
+    grey_scale: float
+    layer_px: float
+    layer_growth: float
+    slope_penalty_px2: float
 
 
 @njit(cache=True, nogil=True)
-def fill_rows(
-    scene: Scene, support: Support, rules: Rules, first: int, step: int, told: NDArray[np.float32]
-) -> None:
-    """Fill rows `first`, `first + step`, ...: even ones by fits, odd ones as those beside them.
-
-    An odd row is told what the even ones above and below say, and fitted where neither tells.
+def fill_rows(scene: Scene, rules: Rules, first: int, step: int, told: NDArray[np.float32]) -> None:
+    """Fill the classified pixels of rows `first`, `first + step`, ...
 
     Args:
         scene: what is filled.
-        support: of it.
         rules: of the fit.
-        first: row. Odd rows need the even ones beside them filled.
-        step: between rows, even.
-        told: (h, w) in place: the disparity where nothing is to be filled, the told value
-            elsewhere; NaN where nothing may speak.
+        first: row.
+        step: between rows.
+        told: (h, w) in place: the disparity where something may speak for a classified pixel.
     """
     height, width = told.shape
-    on_left, on_right = np.empty(width, np.int32), np.empty(width, np.int32)
-    fitted, state = np.empty(width, np.int32), np.empty(N_STATE, np.float32)
+    on_left, on_right = np.empty(width, np.int64), np.empty(width, np.int64)
     for y in range(first, height, step):
-        _speakers(scene.is_support[y], scene.classes[y], rules.max_gap, on_left, on_right)
-        _keep_matches(scene.disparity[y], scene.classes[y], told[y])
-        if y % 2 == 1:
-            _from_beside(scene, y, min(y + 1, height - 1), on_left, on_right, told)
-        _fill_runs(scene, support, rules, y, on_left, on_right, fitted, state, told[y])
-
-
-@njit(cache=True, nogil=True)
-def _keep_matches(
-    disparity: NDArray[np.float32], classes: NDArray[np.uint8], told: NDArray[np.float32]
-) -> None:
-    for x in range(len(told)):
-        told[x] = disparity[x] if classes[x] == 0 else np.float32(np.nan)
-
-
-@njit(cache=True, nogil=True)
-def _from_beside(
-    scene: Scene,
-    y: int,
-    next_y: int,
-    on_left: NDArray[np.int32],
-    on_right: NDArray[np.int32],
-    told: NDArray[np.float32],
-) -> None:
-    """What the pixels of the same class above and below say; of two surfaces, the similar one.
-
-    Nobody need speak any more for a pixel that is told.
-    """
-    above, below, own = told[y - 1], told[next_y], told[y]
-    classes, above_classes, below_classes = (
-        scene.classes[y], scene.classes[y - 1], scene.classes[next_y],
-    )  # fmt: skip
-    picture, above_picture, below_picture = (
-        scene.picture[y], scene.picture[y - 1], scene.picture[next_y],
-    )  # fmt: skip
-    for x in range(len(own)):
-        if on_left[x] < 0 and on_right[x] < 0:
-            continue
-        upper = above[x] if above_classes[x] == classes[x] else np.float32(np.nan)
-        lower = below[x] if below_classes[x] == classes[x] and next_y > y else np.float32(np.nan)
-        if np.isnan(upper) and np.isnan(lower):
-            continue
-        on_left[x] = on_right[x] = -1
-        if np.isnan(upper) or np.isnan(lower):
-            own[x] = lower if np.isnan(upper) else upper
-        elif abs(upper - lower) < _SAME_PX:
-            own[x] = np.float32(0.5) * (upper + lower)
-        else:
-            up = abs(np.int64(picture[x]) - np.int64(above_picture[x]))
-            down = abs(np.int64(picture[x]) - np.int64(below_picture[x]))
-            own[x] = upper if up < down else lower
+        _speakers(scene.is_support[y], scene.classes[y], rules.max_gap_px, on_left, on_right)
+        begin = 0
+        while begin < width:
+            left, right = on_left[begin], on_right[begin]
+            end = begin + 1
+            while end < width and on_left[end] == left and on_right[end] == right:
+                end += 1
+            if left >= 0 or right >= 0:
+                for x in range(begin, end, _PIECE_PX):
+                    _fill_piece(scene, rules, y, (left, right), x, told[y, x:end][:_PIECE_PX])
+            begin = end
 
 
 @njit(cache=True, nogil=True)
@@ -103,8 +73,8 @@ def _speakers(
     is_support: NDArray[np.bool_],
     classes: NDArray[np.uint8],
     max_gap: int,
-    on_left: NDArray[np.int32],
-    on_right: NDArray[np.int32],
+    on_left: NDArray[np.int64],
+    on_right: NDArray[np.int64],
 ) -> None:
     """Columns of the nearest support that may speak for each pixel to fill of a row, or -1.
 
@@ -124,59 +94,93 @@ def _speakers(
 
 
 @njit(cache=True, nogil=True)
-def _fill_runs(
+def _fill_piece(
     scene: Scene,
-    support: Support,
     rules: Rules,
     y: int,
-    on_left: NDArray[np.int32],
-    on_right: NDArray[np.int32],
-    fitted: NDArray[np.int32],
-    state: NDArray[np.float32],
-    told: NDArray[np.float32],
+    speakers: tuple[int, int],
+    begin: int,
+    piece: NDArray[np.float32],
 ) -> None:
-    """Fits and straight lines between them over every run of a row.
+    """Fill a few pixels from column `begin` on with one plane, of the farther speaker's layer.
 
-    A run is a stretch of pixels for which the same pixels speak. Its ends are fitted, and between
-    them the sparser the further from what was measured.
+    The plane stays within what was measured, and a little beyond.
     """
-    n = 0
-    begin = 0
-    while begin < len(told):
-        if on_left[begin] < 0 and on_right[begin] < 0:
-            begin += 1
+    centre = begin + 0.5 * (len(piece) - 1)
+    layer, near, grey = np.inf, np.inf, 0.0
+    for u in speakers:
+        if u >= 0:
+            layer, near = min(layer, scene.disparity[y, u]), min(near, abs(u - centre))
+    for k in range(len(piece)):
+        grey += scene.picture[y, begin + k] / len(piece)
+    place = centre, y, layer, near, grey
+    sums, low, high = np.zeros(9), np.inf, -np.inf
+    up = rules.rows // _STRIDE_PX * _STRIDE_PX
+    for v in range(y - up, y + up + 1, _STRIDE_PX):
+        if 0 <= v < len(scene.disparity):
+            for side in range(2):
+                if speakers[side] >= 0:
+                    ends = _add_support(scene, rules, v, speakers[side], 2 * side - 1, place, sums)
+                    low, high = min(low, ends[0]), max(high, ends[1])
+    if sums[0] == 0.0:
+        piece[:] = layer
+        return
+    value, slope = _plane_of_row(sums / sums[0], rules.slope_penalty_px2)
+    for k in range(len(piece)):
+        d = value + slope * (begin + k - centre)
+        piece[k] = layer + min(max(d, low - _BEYOND_PX), high + _BEYOND_PX)
+
+
+@njit(cache=True, nogil=True)
+def _add_support(
+    scene: Scene,
+    rules: Rules,
+    v: int,
+    first: int,
+    outwards: int,
+    place: tuple[float, int, float, float, float],
+    sums: NDArray[np.float64],
+) -> tuple[float, float]:
+    """Add the normal equations of one side of a row of support; the range of its disparities.
+
+    A weight falls with the difference in grey levels and with the distance, from the nearest
+    speaker. Only what differs little from the layer speaks.
+    """
+    centre, y, layer, near, grey = place
+    disparity, is_support = scene.disparity[v], scene.is_support[v]
+    picture, confidence = scene.picture[v], scene.confidence[v]
+    dy = float(v - y)
+    low, high = np.inf, -np.inf
+    inwards = min(int(abs(first - centre)), rules.radius_px) // _STRIDE_PX * _STRIDE_PX
+    for k in range(-inwards, rules.radius_px + 1, _STRIDE_PX):
+        u = first + outwards * k
+        if not 0 <= u < len(disparity) or not is_support[u]:
             continue
-        end = _end_of_run(begin, on_left, on_right)
-        x = begin
-        while x < end - 1:
-            fitted[n] = x
-            n += 1
-            near = nearest(x, on_left[x], on_right[x])
-            x = min(x + min(1 + near // _GAP_PER_SPACING, _WIDEST_SPACING_PX), end - 1)
-        fitted[n] = end - 1
-        n += 1
-        begin = end
-    fit(scene, support, rules, y, fitted[:n], on_left, on_right, state, told)
-    for k in range(n - 1):
-        # Nobody speaks between two runs that do not touch.
-        inside = fitted[k] + 1
-        if inside < fitted[k + 1] and (on_left[inside] >= 0 or on_right[inside] >= 0):
-            _draw_line(told, fitted[k], fitted[k + 1])
+        dx, d = u - centre, disparity[u] - layer
+        if abs(d) >= rules.layer_px + rules.layer_growth * abs(dx):
+            continue
+        far = (np.sqrt(dx * dx + dy * dy) - near) / rules.distance_px
+        far += abs(picture[u] - grey) / rules.grey_scale
+        w = (max(confidence[u], 0.0) + _LEAST_TRUST) * np.exp(np.float32(-far))
+        sums[0] += w
+        sums[1] += w * dx
+        sums[2] += w * dy
+        sums[3] += w * d
+        sums[4] += w * dx * dx
+        sums[5] += w * dx * dy
+        sums[6] += w * dy * dy
+        sums[7] += w * dx * d
+        sums[8] += w * dy * d
+        low, high = min(low, d), max(high, d)
+    return low, high
 
 
 @njit(cache=True, nogil=True)
-def _end_of_run(begin: int, on_left: NDArray[np.int32], on_right: NDArray[np.int32]) -> int:
-    """Column after the last pixel for which the same pixels speak."""
-    end = begin + 1
-    while (
-        end < len(on_left) and on_left[end] == on_left[begin] and on_right[end] == on_right[begin]
-    ):
-        end += 1
-    return end
-
-
-@njit(cache=True, nogil=True)
-def _draw_line(row: NDArray[np.float32], begin: int, end: int) -> None:
-    slope = (row[end] - row[begin]) / np.float32(end - begin)
-    for x in range(begin + 1, end):
-        row[x] = row[begin] + slope * np.float32(x - begin)
+def _plane_of_row(means: NDArray[np.float64], slope_penalty: float) -> tuple[float, float]:
+    """Value and slope along the row, at the piece's centre, of weighted means."""
+    _, x, y, d, xx, xy, yy, xd, yd = means
+    xx, xy, yy = xx - x * x + slope_penalty, xy - x * y, yy - y * y + slope_penalty
+    xd, yd = xd - x * d, yd - y * d
+    determinant = xx * yy - xy * xy
+    slope_x, slope_y = (xd * yy - yd * xy) / determinant, (xx * yd - xy * xd) / determinant
+    return d - slope_x * x - slope_y * y, slope_x

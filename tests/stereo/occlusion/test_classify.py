@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from navapp.stereo.occlusion.classify import classify, project_to_right
-from navapp.stereo.occlusion.classify_kernels import class_rows
 from navapp.values import DisparityMap, Origin
 from tests.reference.occlusion_reference import seen_from_right_reference
 
@@ -84,14 +83,9 @@ def right_view_as_seen() -> np.ndarray:
     return true_views()[1].astype(np.float32)
 
 
-def without_edges() -> np.ndarray:
-    """A picture that tells nothing."""
-    return np.full((HEIGHT, WIDTH), 90, dtype=np.uint8)
-
-
 def test_the_strip_that_the_right_camera_does_not_see_is_a_border_occlusion() -> None:
     left, _ = found_views()
-    classes = classify(as_map(left), right_view_as_seen(), 0, WIDTH, without_edges())
+    classes = classify(as_map(left), right_view_as_seen(), 0, WIDTH)
     is_strip = np.arange(WIDTH) - true_views()[0] < 0
     # The agreed end of a slanted strip is good to a pixel.
     assert (classes == Origin.FILLED_BORDER)[is_strip].mean() > 0.97
@@ -102,7 +96,7 @@ def test_what_the_square_hides_is_an_interior_occlusion() -> None:
     left, _ = found_views()
     hidden, _ = hidden_places()
     assert hidden.sum() > 200
-    classes = classify(as_map(left), right_view_as_seen(), 0, WIDTH, without_edges())
+    classes = classify(as_map(left), right_view_as_seen(), 0, WIDTH)
     is_interior = classes == Origin.FILLED_INTERIOR
     # A pixel at either end may still be within reach of a right pixel.
     assert is_interior[hidden].mean() > 0.9
@@ -111,7 +105,7 @@ def test_what_the_square_hides_is_an_interior_occlusion() -> None:
 
 def test_matches_stand() -> None:
     left, _ = found_views()
-    classes = classify(as_map(left), right_view_as_seen(), 0, WIDTH, without_edges())
+    classes = classify(as_map(left), right_view_as_seen(), 0, WIDTH)
     inside = np.isfinite(left) & (np.arange(WIDTH) > 20)
     assert (classes[inside] == 0).all()
 
@@ -119,7 +113,7 @@ def test_matches_stand() -> None:
 def test_the_rest_is_a_mismatch() -> None:
     left, _ = found_views()
     left[20:24, 130:136] = np.nan
-    classes = classify(as_map(left), right_view_as_seen(), 0, WIDTH, without_edges())
+    classes = classify(as_map(left), right_view_as_seen(), 0, WIDTH)
     assert (classes[20:24, 130:136] == Origin.MISMATCH_FILLED).all()
 
 
@@ -134,15 +128,14 @@ def test_only_left_of_something_nearer_is_an_interior_occlusion(
     line[:, 30:] = on_right
     line[:, 25:30] = np.nan
     nobody = np.full((5, 60), np.nan, dtype=np.float32)
-    grey = np.full((5, 60), 90, dtype=np.uint8)
-    classes = classify(as_map(line, x=60), nobody, 60, 200, grey)
+    classes = classify(as_map(line, x=60), nobody, 60, 200)
     assert (classes[:, 25:30] == expected).all()
 
 
 def test_accidental_matches_in_the_strip_are_withdrawn() -> None:
     left, _ = found_views()
     left[30:33, 4:8] = 3.0
-    classes = classify(as_map(left), right_view_as_seen(), 0, WIDTH, without_edges())
+    classes = classify(as_map(left), right_view_as_seen(), 0, WIDTH)
     assert (classes[30:33, 4:8] == Origin.FILLED_BORDER).all()
 
 
@@ -151,7 +144,7 @@ def test_a_box_inside_the_picture_has_no_border_strip() -> None:
     box = as_map(left[:, 30:], x=30)
     box.disparity_px[:, :10] = np.nan
     box.origin[:, :10] = Origin.UNKNOWN
-    classes = classify(box, right_view_as_seen(), 0, WIDTH, without_edges()[:, 30:])
+    classes = classify(box, right_view_as_seen(), 0, WIDTH)
     assert not (classes == Origin.FILLED_BORDER).any()
     assert (classes[:10, :10] != 0).all()
 
@@ -159,9 +152,9 @@ def test_a_box_inside_the_picture_has_no_border_strip() -> None:
 @pytest.mark.parametrize("first", [0, 10])
 def test_boxes_of_both_views_meet_where_their_columns_say(first: int) -> None:
     left, _ = found_views()
-    whole = classify(as_map(left), right_view_as_seen(), 0, WIDTH, without_edges())
+    whole = classify(as_map(left), right_view_as_seen(), 0, WIDTH)
     part, right_part = as_map(left[:, 40:], x=40), right_view_as_seen()[:, first:]
-    box = classify(part, right_part, first, WIDTH, without_edges()[:, 40:])
+    box = classify(part, right_part, first, WIDTH)
     np.testing.assert_array_equal(box, whole[:, 40:])
 
 
@@ -169,9 +162,7 @@ def test_the_mirrored_right_view_obeys_the_same_rules() -> None:
     _, right = found_views()
     left_as_seen = true_views()[0].astype(np.float32)
     _, hidden = hidden_places()
-    classes = classify(
-        mirrored(as_map(right), WIDTH), left_as_seen[:, ::-1], 0, WIDTH, without_edges()
-    )[:, ::-1]
+    classes = classify(mirrored(as_map(right), WIDTH), left_as_seen[:, ::-1], 0, WIDTH)[:, ::-1]
     is_strip = np.arange(WIDTH) + true_views()[1] > WIDTH - 1
     assert (classes == Origin.FILLED_BORDER)[is_strip].mean() > 0.9
     assert (classes == Origin.FILLED_INTERIOR)[hidden].mean() > 0.9
@@ -179,47 +170,16 @@ def test_the_mirrored_right_view_obeys_the_same_rules() -> None:
     assert np.nonzero(classes == Origin.FILLED_INTERIOR)[1].min() >= RIGHT_COLUMNS.stop - 1
 
 
-def test_fattened_edges_that_look_like_the_background_are_withdrawn() -> None:
-    left, _ = found_views()
-    picture = np.full((HEIGHT, WIDTH), 60, dtype=np.uint8)
-    picture[ROWS, LEFT_COLUMNS] = 200
-    left[ROWS, LEFT_COLUMNS.start - 2 : LEFT_COLUMNS.start] = NEAR
-    without = classify(as_map(left), right_view_as_seen(), 0, WIDTH, without_edges())
-    with_picture = classify(as_map(left), right_view_as_seen(), 0, WIDTH, picture)
-    fattened = (ROWS, slice(LEFT_COLUMNS.start - 2, LEFT_COLUMNS.start))
-    assert (without[fattened] == 0).all()
-    assert (with_picture[fattened] == Origin.FILLED_INTERIOR).all()
-    # The square itself, and everything else, stands.
-    without[fattened] = with_picture[fattened]
-    np.testing.assert_array_equal(with_picture, without)
-
-
-def test_an_edge_moves_by_the_median_of_the_splits_beside_it() -> None:
-    splits = np.full((5, 8), -1, dtype=np.int8)
-    matched = np.full((5, 8), Origin.MATCHED, dtype=np.uint8)
-    disparity = np.where(np.arange(8) < 3, 10.0, 15.0).astype(np.float32)
-    disparity = np.repeat(disparity[None], 5, axis=0)
-    splits[:, 3] = (2, 2, 3, 0, 1)
-    classes = np.empty((5, 8), dtype=np.uint8)
-    begins, seen = np.zeros(5, dtype=np.int64), np.ones((5, 8), dtype=bool)
-    class_rows(disparity, matched, begins, seen, splits, 0, 1, classes)
-    assert [int((row != 0).sum()) for row in classes] == [2, 2, 2, 1, 1]
-    lonely = np.full((5, 8), -1, dtype=np.int8)
-    lonely[2, 3] = 3
-    class_rows(disparity, matched, begins, seen, lonely, 0, 1, classes)
-    assert (classes == 0).all()
-
-
 def test_a_map_without_matches_is_all_unmatched() -> None:
     nothing = np.full((8, 20), np.nan, dtype=np.float32)
-    classes = classify(as_map(nothing), nothing, 0, 20, np.zeros((8, 20), np.uint8))
+    classes = classify(as_map(nothing), nothing, 0, 20)
     assert (classes == Origin.MISMATCH_FILLED).all()
 
 
 def test_what_lies_outside_the_picture_has_no_class() -> None:
     nothing = np.full((8, 40), np.nan)
-    nobody, dark = np.empty((8, 0), dtype=np.float32), np.zeros((8, 40), dtype=np.uint8)
-    classes = classify(as_map(nothing, x=-10), nobody, 0, 20, dark)
+    nobody = np.empty((8, 0), dtype=np.float32)
+    classes = classify(as_map(nothing, x=-10), nobody, 0, 20)
     assert (classes[:, :10] == 0).all()
     assert (classes[:, 10:30] != 0).all()
     assert (classes[:, 30:] == 0).all()
@@ -228,14 +188,7 @@ def test_what_lies_outside_the_picture_has_no_class() -> None:
 def test_views_of_different_rows_are_refused() -> None:
     left, _ = found_views()
     with pytest.raises(ValueError, match="same rows"):
-        classify(as_map(left), right_view_as_seen()[1:], 0, WIDTH, without_edges())
-
-
-@pytest.mark.parametrize("shape", [(50, 159), (50, 160, 3)])
-def test_a_picture_that_does_not_fit_is_refused(shape: tuple[int, ...]) -> None:
-    left, _ = found_views()
-    with pytest.raises(ValueError, match="picture"):
-        classify(as_map(left), right_view_as_seen(), 0, WIDTH, np.zeros(shape, dtype=np.uint8))
+        classify(as_map(left), right_view_as_seen()[1:], 0, WIDTH)
 
 
 @pytest.mark.parametrize("left_x", [0, 37, 150, -20])

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from navapp.stereo.occlusion import classify as occlusion
-from navapp.stereo.occlusion import wls_fill
 from navapp.stereo.occlusion.classify import classify
 from navapp.stereo.occlusion.wls_fill import FillSettings, fill_wls, support_radius_px
 from navapp.values import DisparityMap, Origin
@@ -23,7 +22,6 @@ from tests.stereo.occlusion.test_classify import (
     found_views,
     mirrored,
     true_views,
-    without_edges,
 )
 
 
@@ -40,14 +38,14 @@ def sure() -> np.ndarray:
 def filled_left() -> tuple[DisparityMap, DisparityMap]:
     """The left view before and after."""
     before = as_map(found_views()[0])
-    classes = classify(before, true_views()[1].astype(np.float32), 0, WIDTH, without_edges())
+    classes = classify(before, true_views()[1].astype(np.float32), 0, WIDTH)
     return before, fill_wls(before, picture_of(LEFT_COLUMNS), sure(), classes)
 
 
 def filled_right() -> DisparityMap:
     before = mirrored(as_map(found_views()[1]), WIDTH)
     other = np.ascontiguousarray(true_views()[0][:, ::-1].astype(np.float32))
-    classes = classify(before, other, 0, WIDTH, without_edges())
+    classes = classify(before, other, 0, WIDTH)
     picture = np.ascontiguousarray(picture_of(RIGHT_COLUMNS)[:, ::-1])
     return mirrored(fill_wls(before, picture, sure(), classes), WIDTH)
 
@@ -172,8 +170,7 @@ def test_a_map_without_any_match_stays_unknown() -> None:
 
 def test_the_order_of_the_shares_does_not_matter(monkeypatch: pytest.MonkeyPatch) -> None:
     _, side_by_side = filled_left()
-    for module in (wls_fill, occlusion):
-        monkeypatch.setattr(module, "run_both", lambda first, second: (second(), first()))
+    monkeypatch.setattr(occlusion, "run_both", lambda first, second: (second(), first()))
     _, one_by_one = filled_left()
     assert one_by_one.disparity_px.tobytes() == side_by_side.disparity_px.tobytes()
     assert one_by_one.origin.tobytes() == side_by_side.origin.tobytes()
