@@ -125,3 +125,8 @@ def in_row_bands(
     middle = (height // 2 if middle is None else middle) // every * every
     middle, last = first + middle, first + height
     run_both(partial(job, (first, middle)), partial(job, (middle, last)))
+
+
+def in_two_shares(job: Callable[[int, int], object]) -> None:
+    """Run `job(first_row, step)` for the even and for the odd rows: both have as much to do."""
+    run_both(partial(job, 0, 2), partial(job, 1, 2))

@@ -11,9 +11,8 @@ from navapp.stereo.matching.census_sgm import CensusSettings, FillEvidence, matc
 from navapp.stereo.matching.gradient import match_gradient, smooth_known
 from navapp.stereo.occlusion.classify import classify, project_to_right
 from navapp.stereo.occlusion.wls_fill import FillSettings, fill_wls
-from navapp.stereo.subpixel.coarse_to_fine import refine_surface
+from navapp.stereo.subpixel.coarse_to_fine import refine_scene, refine_surface
 from navapp.stereo.subpixel.refine import refine_on_model, without_specks
-from navapp.stereo.subpixel.refine_scene import refine_scene
 from navapp.values import DisparityMap, FrameTimings, Stopwatch
 
 _DISAGREEMENT = "left and right hardly agree: are the pictures swapped or of another scene?"

@@ -1,11 +1,11 @@
 """What 3,000 registered points cost the paper's chains, against 20,000: errors side by side.
 
-usage: python -m tests.bench.paper_points [FOLDER]
+usage: python -m tests.bench.paper_points [FOLDER] [--knees N]
 
-FOLDER (default: NAVAPP_DATA) is one of `tests.bench.recorded_accuracy`. The femur is registered
-from each sequence's prior and followed, refused or not, as `navapp replay --follow-refused` does;
-and found in each frame from its true pose, where no chain has lost it in frames before. Errors are
-those of all poses.
+FOLDER (default: NAVAPP_DATA) is one of `tests.bench.recorded_accuracy`; simulated knees, whose
+patient moves, are added. The femur is registered from each sequence's rough pose and followed,
+refused or not, as `navapp replay --follow-refused` does; and found in each frame from its true
+pose, where no chain has lost it in frames before. Errors are those of all poses.
 """
 
 import argparse
@@ -13,6 +13,8 @@ import json
 import os
 import sys
 import tempfile
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +22,7 @@ import numpy as np
 from navapp.cli.main import run
 from navapp.control.prior_files import read_prior
 from navapp.evaluation import compute_mean_tre_mm
+from navapp.geometry.rig import StereoRig
 from navapp.geometry.rig_files import read_rig
 from navapp.geometry.transform import RigidTransform
 from navapp.preop import read_plan
@@ -28,27 +31,49 @@ from navapp.tracking import TrackState
 from navapp.tracking.icp_tracker import N_POINTS, IcpTracker
 from navapp.tracking.paper_tracker import PaperTracker
 from navapp.tracking.tracker import TrackerSettings
-from navapp.values import Plan
+from navapp.values import AspectGraph, BoneModel, Prior, StereoPictures
+from sim_devices.scenario import Scenario
+from tests.knees import SimulatedKnee
 from tests.pictures import Pictures
 
 _MANY = 20_000
 _BONE, _SITUATIONS = "femur", ("patient", "instrument")
 _PERIOD_NS = 66_000_000
+_FIRST_SEED, _N_FRAMES = 321, 12
+_GOAL = Goal(np.empty((0, 3)), 1.0)
+
+
+@dataclass(frozen=True)
+class Sequence:
+    """Pictures of one bone, each with its true pose in the left camera."""
+
+    rig: StereoRig
+    bone: BoneModel
+    aspects: AspectGraph | None
+    prior: Prior
+    frames: list[tuple[StereoPictures, RigidTransform]]
 
 
 def main() -> int:
-    """Print one line for each chain."""
+    """Print one line for each chain and way to begin."""
     parser = argparse.ArgumentParser(description=__doc__)
     default = os.environ.get("NAVAPP_DATA", "../shared/data")
     parser.add_argument("folder", nargs="?", default=default)
-    phantoms = sorted(Path(parser.parse_args().folder).glob("phantom_*"))
+    parser.add_argument("--knees", type=int, default=6)
+    options = parser.parse_args()
+    sequences = list(recorded(Path(options.folder)))
+    sequences += [simulated(_FIRST_SEED + k) for k in range(options.knees)]
     print(f"| chain | begun | frames | TRE median, {N_POINTS} points | {_MANY} points | ratio |")
     print("|---|---|---|---|---|---|")
     for kind in (PaperTracker, IcpTracker):
         for begun in ("followed", "at the truth"):
             few, many = (
-                find_all(kind, phantoms, n, is_followed=begun == "followed")
-                for n in (N_POINTS, _MANY)
+                [
+                    error
+                    for sequence in sequences
+                    for error in find(kind, sequence, n_points, is_followed=begun == "followed")
+                ]
+                for n_points in (N_POINTS, _MANY)
             )
             print(
                 f"| {kind.__name__} | {begun} | {len(few)} | {np.median(few):.3f} mm | "
@@ -58,49 +83,64 @@ def main() -> int:
     return 0
 
 
-def find_all(
-    kind: type[IcpTracker], phantoms: list[Path], n_points: int, *, is_followed: bool
-) -> list[float]:
-    """TRE of every frame, mm."""
-    errors: list[float] = []
-    for phantom in phantoms:
-        surface = phantom / f"{_BONE}.ply"
-        with tempfile.TemporaryDirectory() as folder:
-            run(["--quiet", "plan", "--surface", f"{_BONE}={surface}", "--out", folder])
-            plan = read_plan(folder)
+def recorded(folder: Path) -> Iterator[Sequence]:
+    """The phantoms' sequences."""
+    for phantom in sorted(folder.glob("phantom_*")):
+        with tempfile.TemporaryDirectory() as made:
+            surface = phantom / f"{_BONE}.ply"
+            run(["--quiet", "plan", "--surface", f"{_BONE}={surface}", "--out", made])
+            plan = read_plan(made)
         for situation in _SITUATIONS:
-            errors += find(kind, phantom / situation, plan, n_points, is_followed=is_followed)
-    return errors
+            yield Sequence(
+                read_rig(phantom / "rig.yml"), plan.bones[_BONE], plan.aspects.get(_BONE),
+                read_prior(phantom / situation / "prior.json"), list(read(phantom / situation)),
+            )  # fmt: skip
 
 
-def find(
-    kind: type[IcpTracker], sequence: Path, plan: Plan, n_points: int, *, is_followed: bool
-) -> list[float]:
-    """TRE of every frame of a sequence, mm."""
+def read(sequence: Path) -> Iterator[tuple[StereoPictures, RigidTransform]]:
+    """Each frame of a recorded sequence with its truth."""
     import cv2
 
-    bone, rig = plan.bones[_BONE], read_rig(sequence.parent / "rig.yml")
-    settings = TrackerSettings(follows_refused=True)
-    tracker = kind(rig, bone, settings, plan.aspects.get(_BONE), n_points)
-    prior, goal = read_prior(sequence / "prior.json"), Goal(np.empty((0, 3)), 1.0)
-    state, errors = None, []
     for number, entry in enumerate(json.loads((sequence / "truth.json").read_text())["frames"]):
         left, right = (
             cv2.imread(str(sequence / f"{eye}_{entry['index']:04d}.jpg"))
             for eye in ("left", "right")
         )
-        pictures = Pictures(left, right, number * _PERIOD_NS)
         true = RigidTransform("left", _BONE, entry["T_leftcam_from_ct"][_BONE])
+        yield Pictures(left, right, number * _PERIOD_NS), true
+
+
+def simulated(seed: int) -> Sequence:
+    """A knee that moves."""
+    knee = SimulatedKnee(
+        Scenario(seed=seed, side="left" if seed % 2 else "right", motion="patient")
+    )
+    frames = knee.frames(_N_FRAMES)
+    knee.camera.close()
+    return Sequence(
+        knee.rig, knee.bone, None, knee.prior, [(frame, knee.truth(frame)) for frame in frames]
+    )
+
+
+def find(
+    kind: type[IcpTracker], sequence: Sequence, n_points: int, *, is_followed: bool
+) -> list[float]:
+    """TRE of every frame of a sequence, mm."""
+    settings = TrackerSettings(follows_refused=True)
+    tracker = kind(sequence.rig, sequence.bone, settings, sequence.aspects, n_points)
+    state, errors = None, []
+    for pictures, true in sequence.frames:
         if not is_followed:
             state = TrackState.at_rest(true, pictures.captured_ns)
         elif state is None:
-            (found,) = tracker.register(pictures, prior, goal)
+            (found,) = tracker.register(pictures, sequence.prior, _GOAL)
             assert found.left_from_bone is not None, "nothing was measured"
-            state = TrackState.at_rest(found.left_from_bone, 0)
-        tracked, state = tracker.track(pictures, state, goal)
-        pose = tracked.left_from_bone
-        assert pose is not None, "nothing was measured"
-        errors.append(compute_mean_tre_mm(pose, true, bone, np.empty((0, 3))))
+            state = TrackState.at_rest(found.left_from_bone, pictures.captured_ns)
+        tracked, state = tracker.track(pictures, state, _GOAL)
+        assert tracked.left_from_bone is not None, "nothing was measured"
+        errors.append(
+            compute_mean_tre_mm(tracked.left_from_bone, true, sequence.bone, np.empty((0, 3)))
+        )
     return errors
 
 

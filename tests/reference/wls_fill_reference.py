@@ -1,4 +1,4 @@
-"""Occlusion filling pixel by pixel: the same rules with lists and a least squares solver."""
+"""Occlusion filling piece by piece: the same rules with lists and a least squares solver."""
 
 import math
 
@@ -23,7 +23,9 @@ class SlowFill:
             speakers = self._speakers(y)
             begin = 0
             for x, who in enumerate(speakers):
-                if x + 1 < len(row) and speakers[x + 1] == who and x + 1 - begin < 16:
+                grey = self.picture[y, begin : x + 2]
+                goes_on = len(grey) == x + 2 - begin <= 16 and abs(grey[-1] - grey[0]) <= 30
+                if goes_on and speakers[x + 1] == who:
                     continue
                 if who:
                     row[begin : x + 1] = self._fill_piece(y, np.arange(begin, x + 1), who)
@@ -45,30 +47,27 @@ class SlowFill:
 
     def _fill_piece(self, y: int, columns: NDArray, who: list[int]) -> NDArray:
         centre, grey = columns.mean(), self.picture[y, columns].mean()
-        layer = min(self.disparity[y, u] for u in who)
-        nearest = min(abs(u - centre) for u in who)
+        layer, distance = min((self.disparity[y, u], abs(u - centre)) for u in who)
         equations = []
         for v, u in self._asked(y, centre, who):
             dx, dy, d = u - centre, v - y, float(self.disparity[v, u] - layer)
             if abs(d) < self.settings.layer_px + self.settings.layer_growth * abs(dx):
-                far = (math.hypot(dx, dy) - nearest) / (0.4 * self.radius)
+                far = (math.hypot(dx, dy) - distance) / (0.4 * self.radius)
                 far += abs(self.picture[v, u] - grey) / self.settings.grey_scale
-                weight = (0.05 + self.confidence[v, u]) * math.exp(-far)
+                weight = (0.05 + np.nan_to_num(self.confidence[v, u])) * math.exp(-far)
                 equations.append((weight, dx, dy, d))
-        if not equations:
-            return np.full(len(columns), layer)
         value, slope = plane_at_origin(np.array(equations), self.settings.slope_penalty_px2)
         d = np.array(equations)[:, 3]
         return layer + np.clip(value + slope * (columns - centre), d.min() - 1.0, d.max() + 1.0)
 
     def _asked(self, y: int, centre: float, who: list[int]) -> list[tuple[int, int]]:
-        """Every third support on both sides of who speaks, as far as the piece inwards."""
+        """Every third support on both sides of who speaks, up to the piece's middle inwards."""
         height, width = self.support.shape
-        up = round(0.3 * self.radius) // 3 * 3
+        up = max(round(0.3 * self.radius) // 3, 1) * 3
         asked = []
         for first in who:
             outwards = 1 if first > centre else -1
-            inwards = min(int(abs(first - centre)), self.radius) // 3 * 3
+            inwards = min(int(abs(first - centre) - 0.5), self.radius) // 3 * 3
             for v in range(y - up, y + up + 1, 3):
                 for k in range(-inwards, self.radius + 1, 3):
                     u = first + outwards * k

@@ -5,13 +5,10 @@ occlusion stands left of something nearer, and no right pixel maps to it; the re
 pixels are mismatches. The class decides from which side a pixel may be filled.
 """
 
-from collections.abc import Callable
-from functools import partial
-
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.geometry.bands import run_both
+from navapp.geometry.bands import in_two_shares
 from navapp.stereo.occlusion.classify_kernels import (
     class_rows,
     find_begins,
@@ -74,8 +71,3 @@ def project_to_right(
     right_px = np.empty((left_px.shape[0], picture_width), dtype=np.float32)
     in_two_shares(lambda *rows: project_rows(left_px, left_x, *rows, right_px))
     return right_px
-
-
-def in_two_shares(job: Callable[[int, int], object]) -> None:
-    """Run `job(first_row, step)` for the even and for the odd rows: both have as much to do."""
-    run_both(partial(job, 0, 2), partial(job, 1, 2))

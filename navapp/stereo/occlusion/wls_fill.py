@@ -1,10 +1,10 @@
 """Filling of occlusions by a weighted least squares fit, in the paper's directions.
 
 In the left view an interior occlusion continues what stands on its left, a border occlusion what
-stands on its right. A plane is fitted to matched pixels of that side: near the gap, of the
-background's layer, of similar brightness, and confident. Only measured pixels speak, so no error is
-carried along a gap and rows can be filled in any order. A gap is filled in pieces of a few pixels,
-each with a plane of its own.
+stands on its right, a mismatch what stands on both. A plane is fitted to matched pixels of that
+side: near the gap, of the background's layer, of similar brightness, and confident. Only measured
+pixels speak, so no error is carried along a gap and rows can be filled in any order. Each row of a
+gap is filled in pieces, which end where the picture's brightness changes.
 """
 
 from dataclasses import dataclass
@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from navapp.geometry.bands import in_two_shares
 from navapp.geometry.masks import where
-from navapp.stereo.occlusion.classify import in_two_shares
-from navapp.stereo.occlusion.wls_fill_kernels import Rules, Scene, fill_rows
+from navapp.stereo.occlusion.wls_fill_kernels import STRIDE_PX, Rules, Scene, fill_rows
 from navapp.values import DisparityMap, Origin
 
 _FILLED_SIGMA_PX = 5.0
@@ -29,15 +29,15 @@ _SPREAD_STEP = 3
 class FillSettings:
     """How the fit works."""
 
-    # columns of support beyond the gap; None: grows with the spread of disparities.
+    # of support beyond the gap; None: grows with the spread of disparities.
     radius_px: int | None = None
     # a pixel further from its permitted neighbour stays unknown; None: the width of the map.
     max_gap_px: int | None = None
     grey_scale: float = 6.0  # difference in grey levels at which a pixel's weight is 1/e
     layer_px: float = 3.0  # support differs from the permitted neighbour by less than this ...
     layer_growth: float = 0.15  # ... and this per px of distance
-    # variance of the support's places at which half of the slope is believed; a slope is dangerous
-    # far from where it was fitted.
+    # variance of the support's places at which half of the slope is believed, above 0: a slope is
+    # dangerous far from where it was fitted.
     slope_penalty_px2: float = 20.0
 
 
@@ -92,7 +92,7 @@ def fill_gaps(
         picture=np.ascontiguousarray(picture),
         confidence=np.ascontiguousarray(confidence, dtype=np.float32),
     )
-    rules = _rules(scene, settings or FillSettings())
+    rules = _make_rules(scene, settings or FillSettings())
     told = where(classes == 0, scene.disparity, np.nan)
     in_two_shares(lambda *rows: fill_rows(scene, rules, *rows, told))
     filled = where(~np.isnan(told), scene.classes, Origin.UNKNOWN)
@@ -108,7 +108,7 @@ def support_radius_px(matched_px: NDArray[np.float32]) -> int:
     return round(float(np.clip(radius, *_RADIUS_LIMITS_PX)))
 
 
-def _rules(scene: Scene, settings: FillSettings) -> Rules:
+def _make_rules(scene: Scene, settings: FillSettings) -> Rules:
     radius = settings.radius_px
     if radius is None:
         # A part of the pixels tells the spread as well as all.
@@ -116,7 +116,7 @@ def _rules(scene: Scene, settings: FillSettings) -> Rules:
         radius = support_radius_px(scene.disparity[part][scene.is_support[part]])
     return Rules(
         radius_px=radius,
-        rows=round(_ROWS_PER_RADIUS * radius),
+        n_rows=max(round(_ROWS_PER_RADIUS * radius) // STRIDE_PX, 1),
         max_gap_px=scene.disparity.shape[1] if settings.max_gap_px is None else settings.max_gap_px,
         distance_px=_DISTANCE_PER_RADIUS * radius,
         grey_scale=settings.grey_scale,

@@ -12,10 +12,10 @@ _BORDER, _INTERIOR, _MISMATCH = 2, 3, 4
 _LEAST_TRUST = 0.05
 # A fitted slope may lead this far beyond what was measured.
 _BEYOND_PX = 1.0
-# One plane fills at most so many pixels of a row.
-_PIECE_PX = 16
-# Every so many-th pixel of the support is asked: neighbours tell nearly the same.
-_STRIDE_PX = 3
+# One plane fills at most so many pixels of a row, whose grey levels are alike.
+_PIECE_PX, _ALIKE_GREY = 16, 30
+# Every so many-th column and row of the support is asked: neighbours tell nearly the same.
+STRIDE_PX = 3
 
 
 class Scene(NamedTuple):
@@ -32,13 +32,23 @@ class Rules(NamedTuple):
     """How the fit works; see `FillSettings`."""
 
     radius_px: int
-    rows: int  # of support above and below
+    n_rows: int  # of support above and below, `STRIDE_PX` apart
     max_gap_px: int
     distance_px: float  # at which a pixel's weight is 1/e
     grey_scale: float
     layer_px: float
     layer_growth: float
     slope_penalty_px2: float
+
+
+class Piece(NamedTuple):
+    """Neighbouring pixels of a row for which the same matches speak."""
+
+    row: int
+    middle: float  # column
+    grey: float  # mean
+    layer_px: float  # disparity of the farther match that speaks
+    near_px: float  # its distance from the middle
 
 
 @njit(cache=True, nogil=True)
@@ -55,21 +65,19 @@ def fill_rows(scene: Scene, rules: Rules, first: int, step: int, told: NDArray[n
     height, width = told.shape
     on_left, on_right = np.empty(width, np.int64), np.empty(width, np.int64)
     for y in range(first, height, step):
-        _speakers(scene.is_support[y], scene.classes[y], rules.max_gap_px, on_left, on_right)
+        _find_speakers(scene.is_support[y], scene.classes[y], rules.max_gap_px, on_left, on_right)
         begin = 0
         while begin < width:
-            left, right = on_left[begin], on_right[begin]
             end = begin + 1
-            while end < width and on_left[end] == left and on_right[end] == right:
-                end += 1
-            if left >= 0 or right >= 0:
-                for x in range(begin, end, _PIECE_PX):
-                    _fill_piece(scene, rules, y, (left, right), x, told[y, x:end][:_PIECE_PX])
+            if on_left[begin] >= 0 or on_right[begin] >= 0:
+                end = _find_end(scene.picture[y], begin, on_left, on_right)
+                speakers = on_left[begin], on_right[begin]
+                _fill_piece(scene, rules, y, speakers, begin, told[y, begin:end])
             begin = end
 
 
 @njit(cache=True, nogil=True)
-def _speakers(
+def _find_speakers(
     is_support: NDArray[np.bool_],
     classes: NDArray[np.uint8],
     max_gap: int,
@@ -94,74 +102,88 @@ def _speakers(
 
 
 @njit(cache=True, nogil=True)
+def _find_end(
+    grey: NDArray[np.uint8], begin: int, on_left: NDArray[np.int64], on_right: NDArray[np.int64]
+) -> int:
+    """Column after the last pixel of the piece that begins there."""
+    end = begin + 1
+    while (
+        end < min(begin + _PIECE_PX, len(grey))
+        and on_left[end] == on_left[begin]
+        and on_right[end] == on_right[begin]
+        and abs(float(grey[end]) - float(grey[begin])) <= _ALIKE_GREY
+    ):
+        end += 1
+    return end
+
+
+@njit(cache=True, nogil=True)
 def _fill_piece(
     scene: Scene,
     rules: Rules,
     y: int,
     speakers: tuple[int, int],
     begin: int,
-    piece: NDArray[np.float32],
+    filled: NDArray[np.float32],
 ) -> None:
-    """Fill a few pixels from column `begin` on with one plane, of the farther speaker's layer.
+    """Fill a piece, from column `begin` on, with one plane through what is of the farther layer.
 
     The plane stays within what was measured, and a little beyond.
     """
-    centre = begin + 0.5 * (len(piece) - 1)
-    layer, near, grey = np.inf, np.inf, 0.0
+    middle, grey = begin + 0.5 * (len(filled) - 1), 0.0
+    for k in range(len(filled)):
+        grey += scene.picture[y, begin + k] / len(filled)
+    layer_px, near_px = np.inf, 0.0
     for u in speakers:
-        if u >= 0:
-            layer, near = min(layer, scene.disparity[y, u]), min(near, abs(u - centre))
-    for k in range(len(piece)):
-        grey += scene.picture[y, begin + k] / len(piece)
-    place = centre, y, layer, near, grey
+        if u >= 0 and scene.disparity[y, u] < layer_px:
+            layer_px, near_px = scene.disparity[y, u], abs(u - middle)
+    piece = Piece(y, middle, grey, layer_px, near_px)
     sums, low, high = np.zeros(9), np.inf, -np.inf
-    up = rules.rows // _STRIDE_PX * _STRIDE_PX
-    for v in range(y - up, y + up + 1, _STRIDE_PX):
+    for row in range(-rules.n_rows, rules.n_rows + 1):
+        v = y + row * STRIDE_PX
         if 0 <= v < len(scene.disparity):
-            for side in range(2):
-                if speakers[side] >= 0:
-                    ends = _add_support(scene, rules, v, speakers[side], 2 * side - 1, place, sums)
+            for u, outwards in ((speakers[0], -1), (speakers[1], 1)):
+                if u >= 0:
+                    ends = _add_support(scene, rules, piece, v, u, outwards, sums)
                     low, high = min(low, ends[0]), max(high, ends[1])
-    if sums[0] == 0.0:
-        piece[:] = layer
-        return
-    value, slope = _plane_of_row(sums / sums[0], rules.slope_penalty_px2)
-    for k in range(len(piece)):
-        d = value + slope * (begin + k - centre)
-        piece[k] = layer + min(max(d, low - _BEYOND_PX), high + _BEYOND_PX)
+    value, slope = _fit_plane(sums / sums[0], rules.slope_penalty_px2)
+    for k in range(len(filled)):
+        d = value + slope * (begin + k - middle)
+        filled[k] = layer_px + min(max(d, low - _BEYOND_PX), high + _BEYOND_PX)
 
 
 @njit(cache=True, nogil=True)
 def _add_support(
     scene: Scene,
     rules: Rules,
+    piece: Piece,
     v: int,
     first: int,
     outwards: int,
-    place: tuple[float, int, float, float, float],
     sums: NDArray[np.float64],
 ) -> tuple[float, float]:
-    """Add the normal equations of one side of a row of support; the range of its disparities.
+    """Add one side of row `v` to the sums of `_fit_plane`; the least and the largest disparity.
 
-    A weight falls with the difference in grey levels and with the distance, from the nearest
-    speaker. Only what differs little from the layer speaks.
+    Asked is what stands around column `first`, on the piece's side up to its middle. A weight falls
+    with the difference in grey levels, and with the distance, counted from that of the match whose
+    layer it is. Only what differs little from the layer speaks.
     """
-    centre, y, layer, near, grey = place
     disparity, is_support = scene.disparity[v], scene.is_support[v]
     picture, confidence = scene.picture[v], scene.confidence[v]
-    dy = float(v - y)
+    dy = float(v - piece.row)
     low, high = np.inf, -np.inf
-    inwards = min(int(abs(first - centre)), rules.radius_px) // _STRIDE_PX * _STRIDE_PX
-    for k in range(-inwards, rules.radius_px + 1, _STRIDE_PX):
+    inwards = min(int(abs(first - piece.middle) - 0.5), rules.radius_px) // STRIDE_PX * STRIDE_PX
+    for k in range(-inwards, rules.radius_px + 1, STRIDE_PX):
         u = first + outwards * k
         if not 0 <= u < len(disparity) or not is_support[u]:
             continue
-        dx, d = u - centre, disparity[u] - layer
+        dx, d = u - piece.middle, disparity[u] - piece.layer_px
         if abs(d) >= rules.layer_px + rules.layer_growth * abs(dx):
             continue
-        far = (np.sqrt(dx * dx + dy * dy) - near) / rules.distance_px
-        far += abs(picture[u] - grey) / rules.grey_scale
-        w = (max(confidence[u], 0.0) + _LEAST_TRUST) * np.exp(np.float32(-far))
+        far = (np.sqrt(dx * dx + dy * dy) - piece.near_px) / rules.distance_px
+        far += abs(picture[u] - piece.grey) / rules.grey_scale
+        trust = confidence[u] if confidence[u] > 0.0 else 0.0
+        w = (trust + _LEAST_TRUST) * np.exp(np.float32(-far))
         sums[0] += w
         sums[1] += w * dx
         sums[2] += w * dy
@@ -176,8 +198,11 @@ def _add_support(
 
 
 @njit(cache=True, nogil=True)
-def _plane_of_row(means: NDArray[np.float64], slope_penalty: float) -> tuple[float, float]:
-    """Value and slope along the row, at the piece's centre, of weighted means."""
+def _fit_plane(means: NDArray[np.float64], slope_penalty: float) -> tuple[float, float]:
+    """Value and slope along the row, at the piece's middle, by weighted means.
+
+    Those of 1, x, y, d, xx, xy, yy, xd, yd: x and y from the piece's middle, d from its layer.
+    """
     _, x, y, d, xx, xy, yy, xd, yd = means
     xx, xy, yy = xx - x * x + slope_penalty, xy - x * y, yy - y * y + slope_penalty
     xd, yd = xd - x * d, yd - y * d
