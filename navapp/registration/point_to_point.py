@@ -54,12 +54,14 @@ def solve_bimcc_literal(
     """BiMCC-ICP as printed, with the print's slips mended (docs/how/registration.md).
 
     All scene points pair forward and the model's points backward, those that no camera can see too:
-    on a one-sided view the far side pulls the model towards the camera. Of either about `n_points`
-    pair, evenly, None is all; partners are looked up among all.
+    on a one-sided view the far side pulls the model towards the camera. About `n_points` of the
+    scene's pair, evenly, None is all, and as large a part of the model's, so that the two sides
+    weigh as with all; partners are looked up among all.
 
     Source: the paper, proposed equations (4) to (9) and Algorithm 2.
     """
-    return _iterate(scene, model, start, _step(scene, n_points), _step(model.points_mm, n_points))
+    every = _step(scene, n_points)
+    return _iterate(scene, model, start, every, every)
 
 
 def solve_sums(sums: FloatArray, frames: RigidTransform) -> RigidTransform:

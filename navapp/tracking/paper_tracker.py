@@ -12,9 +12,8 @@ from navapp.tracking.icp_tracker import IcpTracker
 from navapp.tracking.surface_meter import Margins, Measurement
 from navapp.values import PoseEstimate
 
-# Among so many points the partners of the model's are looked up: among fewer a pose rests nearer to
-# where it began (chosen).
-_N_AMONG = 6_000
+# Among so many points the partners of the model's are looked up (chosen).
+_N_AMONG = 20_000
 
 
 class PaperTracker(IcpTracker):

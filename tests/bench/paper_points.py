@@ -1,4 +1,4 @@
-"""What 3,000 registered points cost the paper's chains, against 20,000: errors side by side.
+"""What the points that the paper's chains register cost, against 20,000: errors side by side.
 
 usage: python -m tests.bench.paper_points [FOLDER] [--knees N]
 

@@ -44,7 +44,7 @@ def test_one_fit_to_so_many_points_makes_an_answer(kind) -> None:
         made = kind(a.rig, a.tracker.model.bone)
         begun = made.begin(frame, start, view)
         fit = made.find_fit(begun, margins)
-        assert len(fit.measured.cloud) == (3000 if kind is IcpTracker else 6000)
+        assert len(fit.measured.cloud) == (3000 if kind is IcpTracker else 20_000)
         if margins is NEAR_BOX:
             state = TrackState.at_rest(start, 0)
             tracked, _ = made.glance(replace(frame, captured_ns=0), state, GOAL)
