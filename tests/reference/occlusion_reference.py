@@ -1,9 +1,11 @@
-"""What the right camera sees of a surface known in the left view, pixel by pixel."""
+"""Classes of unmatched pixels, and what the right camera sees of a surface, pixel by pixel."""
 
 import math
 
 import numpy as np
 from numpy.typing import NDArray
+
+from navapp.values import Origin
 
 
 def seen_from_right_reference(
@@ -23,3 +25,40 @@ def seen_from_right_reference(
             if falls_here:
                 right_px[y, u] = max(falls_here)
     return right_px
+
+
+def classes_reference(
+    disparity: NDArray[np.float32], is_matched: NDArray[np.bool_], x0: int, right_px, right_x0: int
+) -> NDArray[np.uint8]:
+    """(h, w) 0 where a match stands, else what filled pixels will be; all inside the picture."""
+    height, width = disparity.shape
+    ends = [_end_of_strip(disparity[y], is_matched[y], x0) for y in range(height)]
+    classes = np.zeros((height, width), dtype=np.uint8)
+    for y in range(height):
+        near = [end for end in ends[max(y - 4, 0) : y + 5] if end is not None]
+        begin = int(np.median(near)) if near else 0
+        told = np.flatnonzero(np.isfinite(right_px[y]))
+        points_at = told + right_x0 + right_px[y, told] - x0
+        for x in range(width):
+            if x < begin:
+                classes[y, x] = Origin.FILLED_BORDER
+            elif not is_matched[y, x]:
+                is_seen = (np.abs(points_at - x) <= 0.6).any()
+                classes[y, x] = Origin.MISMATCH_FILLED if is_seen else Origin.FILLED_INTERIOR
+        for x in np.flatnonzero(classes[y] == Origin.FILLED_INTERIOR):
+            stands = np.flatnonzero(classes[y] == 0)
+            before, after = stands[stands < x], stands[stands > x]
+            is_behind = len(after) == 0 or (
+                len(before) > 0 and disparity[y, before[-1]] <= disparity[y, after[0]]
+            )
+            if len(before) == 0 or not is_behind:
+                classes[y, x] = Origin.MISMATCH_FILLED
+    return classes
+
+
+def _end_of_strip(disparity: NDArray, is_matched: NDArray, x0: int) -> float | None:
+    """Where six matches in a row begin, hardly further than the right picture's edge."""
+    for x in range(len(disparity) - 5):
+        if is_matched[x : x + 6].all():
+            return max(min(float(x), float(disparity[x]) + 8.0 - x0), 0.0)
+    return None

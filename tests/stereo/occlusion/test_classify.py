@@ -5,7 +5,7 @@ import pytest
 
 from navapp.stereo.occlusion.classify import classify, project_to_right
 from navapp.values import DisparityMap, Origin
-from tests.reference.occlusion_reference import seen_from_right_reference
+from tests.reference.occlusion_reference import classes_reference, seen_from_right_reference
 
 pytestmark = pytest.mark.kernel
 
@@ -189,6 +189,23 @@ def test_views_of_different_rows_are_refused() -> None:
     left, _ = found_views()
     with pytest.raises(ValueError, match="same rows"):
         classify(as_map(left), right_view_as_seen()[1:], 0, WIDTH)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_classes_are_those_of_the_reference(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    left = np.repeat(rng.integers(5, 25, (12, 10)), 8, axis=1) + rng.normal(0.0, 0.2, (12, 80))
+    # Fewer and fewer matches to the left, where the right camera sees nothing.
+    left[rng.random(left.shape) < np.linspace(0.6, 0.05, 80)] = np.nan
+    right = np.where(rng.random((12, 70)) < 0.3, np.nan, rng.uniform(5.0, 25.0, (12, 70)))
+    right, x0, right_x0 = right.astype(np.float32), (0, 6)[seed % 2], (0, -9)[seed // 2 % 2]
+    found = as_map(left, x=x0)
+    classes = classify(found, right, right_x0, 200)
+    expected = classes_reference(
+        found.disparity_px, found.is_matched, x0, right.astype(float), right_x0
+    )
+    np.testing.assert_array_equal(classes, expected)
+    assert len(np.unique(classes)) == 4
 
 
 @pytest.mark.parametrize("left_x", [0, 37, 150, -20])
