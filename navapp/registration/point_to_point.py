@@ -45,7 +45,7 @@ def solve_icp(
 
     Source: the paper, state of the art, equation (1); Besl and McKay 1992.
     """
-    return _iterate(scene, model, start, _step(scene, n_points), 0)
+    return _iterate(scene, model, start, _step(scene, n_points), is_both=False)
 
 
 def solve_bimcc_literal(
@@ -53,15 +53,13 @@ def solve_bimcc_literal(
 ) -> Solution:
     """BiMCC-ICP as printed, with the print's slips mended (docs/how/registration.md).
 
-    All scene points pair forward and the model's points backward, those that no camera can see too:
-    on a one-sided view the far side pulls the model towards the camera. About `n_points` of the
-    scene's pair, evenly, None is all, and as large a part of the model's, so that the two sides
-    weigh as with all; partners are looked up among all.
+    About `n_points` of the scene pair forward (None: all), evenly, and as large a part of the model
+    backward, its far side too: on a one-sided view that pulls the model towards the camera.
+    Partners are looked up among all.
 
     Source: the paper, proposed equations (4) to (9) and Algorithm 2.
     """
-    every = _step(scene, n_points)
-    return _iterate(scene, model, start, every, every)
+    return _iterate(scene, model, start, _step(scene, n_points), is_both=True)
 
 
 def solve_sums(sums: FloatArray, frames: RigidTransform) -> RigidTransform:
@@ -91,27 +89,26 @@ class _Pairing(NamedTuple):
 
     seen: PointSet  # the scene, in its frame
     bone: PointSet  # the model, in its frame
-    # every n-th scene point pairs forward, every n-th model point backward; 0: none.
-    forward: int
-    backward: int
+    every: int  # n-th scene point pairs forward, and model point backward
+    is_both: bool  # not only forward
 
 
 def _iterate(
-    scene: Scene, model: RegistrationModel, pose: RigidTransform, forward: int, backward: int
+    scene: Scene, model: RegistrationModel, pose: RigidTransform, every: int, *, is_both: bool
 ) -> Solution:
     """Pairs, weights and least squares, until the model stands still under the narrowest kernel.
 
-    Of every n-th scene point forward, and model point backward (0 is plain ICP); at first of a part
+    Of every n-th scene point forward, and of model points backward if `is_both`; at first of a part
     of them.
     """
     if len(scene) < MIN_POINTS:
         return solution_at(scene, model, pose)
     bone = PointSet(model.points_mm, model.arrays.neighbours, model.arrays.grid)
-    whole = _Pairing(_prepare_scene(scene.points_mm, backward > 0), bone, forward, backward)
-    thinning = _step(scene.points_mm[::forward], _N_COARSE)
-    pairing = whole._replace(forward=thinning * forward, backward=thinning * backward)
+    whole = _Pairing(_prepare_scene(scene.points_mm, is_both), bone, every, is_both)
+    thinning = _step(scene.points_mm[::every], _N_COARSE)
+    pairing = whole._replace(every=thinning * every)
     sigma_mm, iterations, is_converged = np.inf, 0, False
-    if backward:
+    if is_both:
         _, distance_mm = _pair(pairing, pose, sigma_mm)
         sigma_mm = _limit_mm(_FIRST_MEDIANS * float(np.median(distance_mm)))
     for iterations in range(1, _MAX_ITERATIONS + 1):
@@ -126,7 +123,7 @@ def _iterate(
             break
         if is_still or thinning == 1 or iterations >= _MAX_COARSE_ITERATIONS:
             pairing = whole
-        sigma_mm = _limit_mm(_DECAY * sigma_mm) if backward else sigma_mm
+        sigma_mm = _limit_mm(_DECAY * sigma_mm) if is_both else sigma_mm
     return solution_at(scene, model, pose, iterations=iterations, is_converged=is_converged)
 
 
@@ -148,23 +145,21 @@ def _pair(
     Equations (7) to (9) in half-quadratic form: the kernel's value is the pair's weight. Half of
     the pairs are found on either thread.
     """
-    seen, bone, every, back_every = pairing
+    seen, bone, every, is_both = pairing
     forward = Pose(*pose.inverse_parts())
     backward = Pose(np.array(pose.rotation), np.array(pose.translation_mm))
     ahead_mm, back_mm = np.empty(len(seen.points)), np.empty(len(bone.points))
 
     def sum_share(share: int) -> FloatArray:
-        sums = np.zeros((2, 4, 4))
-        span = share * every, 2 * every
+        sums, span = np.zeros((2, 4, 4)), (share * every, 2 * every)
         sum_pairs(seen, bone, forward, sigma_mm, *span, ahead_mm, sums[0])
-        if back_every:
-            span = share * back_every, 2 * back_every
+        if is_both:
             sum_pairs(bone, seen, backward, sigma_mm, *span, back_mm, sums[1])
         return sums
 
     shares = run_both(partial(sum_share, 0), partial(sum_share, 1))
     ahead, back = np.add(*shares)
-    paired_back_mm = back_mm[::back_every] if back_every else back_mm[:0]
+    paired_back_mm = back_mm[::every] if is_both else back_mm[:0]
     return ahead + back.T, np.concatenate([ahead_mm[::every], paired_back_mm])
 
 

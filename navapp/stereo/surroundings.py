@@ -61,11 +61,10 @@ def match_nearer(coarse: CoarseMap, nearer: NearerSearch) -> CoarseMap:
 
 
 def fill_surroundings(coarse: CoarseMap) -> Surroundings:
-    """The matches of a coarse map, their gaps filled by weighted least squares.
+    """The matches of a coarse map, their gaps filled by weighted least squares (`fill_gaps`).
 
-    Gaps are classified and filled (`fill_gaps`), and filled pixels nearer than their occlusion
-    allows become unknown (`drop_beyond_bound`). A filled pixel has its class as origin: its
-    disparity is a guess.
+    What is filled nearer than its occlusion allows becomes unknown (`drop_beyond_bound`). A filled
+    pixel has its class as origin: it is a guess.
     """
     matched = coarse.matched
     if matched is None:

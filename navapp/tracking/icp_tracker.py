@@ -39,15 +39,16 @@ from navapp.values import (
 )
 from navapp.values.progress import Progress
 
-# With 20,000 points the error is the same within a tenth: `python -m tests.bench.paper_points`.
+# With 20,000 points the error from a true pose is the same within a tenth:
+# `python -m tests.bench.paper_points`.
 N_POINTS = 3000
 
 
 class IcpTracker(Tracker):
     """Finds one bone from a pose, and follows it by its box: one fit in every frame.
 
-    Without `aspects` the expected pose stands for the best view. `n_points` of what is matched and
-    of the model are paired.
+    Without `aspects` the expected pose stands for the best view. About `n_points` of what
+    is matched are paired.
     """
 
     def __init__(

@@ -12,7 +12,7 @@ from navapp.tracking.icp_tracker import IcpTracker
 from navapp.tracking.surface_meter import Margins, Measurement
 from navapp.values import PoseEstimate
 
-# Among so many points the partners of the model's are looked up (chosen).
+# The model's points are paired with the nearest of at most so many scene points (chosen).
 _N_AMONG = 20_000
 
 
@@ -23,7 +23,8 @@ class PaperTracker(IcpTracker):
         """What is matched around a pose, and filled before the Gaussian filter.
 
         Occlusions by weighted least squares: border ones from right to left, the others from left
-        to right. Filled points are registered like matched ones, as the paper has it.
+        to right, mismatches from both. Filled points are registered like matched ones, as the paper
+        has it.
         """
         n_points = max(self.n_points, _N_AMONG)
         return self._match(frame, start, margins, n_points, fills=True)

@@ -66,18 +66,15 @@ def main() -> int:
     print(f"| chain | begun | frames | TRE median, {N_POINTS} points | {_MANY} points | ratio |")
     print("|---|---|---|---|---|---|")
     for kind in (PaperTracker, IcpTracker):
-        for begun in ("followed", "at the truth"):
+        for is_followed in (True, False):
             few, many = (
-                [
-                    error
-                    for sequence in sequences
-                    for error in find(kind, sequence, n_points, is_followed=begun == "followed")
-                ]
-                for n_points in (N_POINTS, _MANY)
+                np.concatenate([find(kind, one, n, is_followed=is_followed) for one in sequences])
+                for n in (N_POINTS, _MANY)
             )
             print(
-                f"| {kind.__name__} | {begun} | {len(few)} | {np.median(few):.3f} mm | "
-                f"{np.median(many):.3f} mm | {np.median(few) / np.median(many):.2f} |",
+                f"| {kind.__name__} | {'followed' if is_followed else 'at the truth'} | "
+                f"{len(few)} | {np.median(few):.3f} mm | {np.median(many):.3f} mm | "
+                f"{np.median(few) / np.median(many):.2f} |",
                 flush=True,
             )
     return 0

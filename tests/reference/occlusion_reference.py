@@ -48,10 +48,10 @@ def classes_reference(
         for x in np.flatnonzero(classes[y] == Origin.FILLED_INTERIOR):
             stands = np.flatnonzero(classes[y] == 0)
             before, after = stands[stands < x], stands[stands > x]
-            is_behind = len(after) == 0 or (
-                len(before) > 0 and disparity[y, before[-1]] <= disparity[y, after[0]]
+            is_possible = len(before) > 0 and (
+                len(after) == 0 or disparity[y, before[-1]] <= disparity[y, after[0]]
             )
-            if len(before) == 0 or not is_behind:
+            if not is_possible:
                 classes[y, x] = Origin.MISMATCH_FILLED
     return classes
 

@@ -20,19 +20,22 @@ class SlowFill:
         """(h, w) the disparity, and what is told where it is classified; NaN: nothing may speak."""
         told = np.where(self.classes == 0, self.disparity, np.nan)
         for y, row in enumerate(told):
-            speakers = self._speakers(y)
+            neighbours = self._neighbours(y)
             begin = 0
-            for x, who in enumerate(speakers):
-                grey = self.picture[y, begin : x + 2]
-                goes_on = len(grey) == x + 2 - begin <= 16 and abs(grey[-1] - grey[0]) <= 30
-                if goes_on and speakers[x + 1] == who:
+            for x, who in enumerate(neighbours):
+                if self._goes_on(y, begin, x + 1) and neighbours[x + 1] == who:
                     continue
                 if who:
                     row[begin : x + 1] = self._fill_piece(y, np.arange(begin, x + 1), who)
                 begin = x + 1
         return told
 
-    def _speakers(self, y: int) -> list[list[int]]:
+    def _goes_on(self, y: int, begin: int, x: int) -> bool:
+        """Whether a piece may reach column x."""
+        row = self.picture[y]
+        return x < len(row) and x - begin < 16 and abs(row[x] - row[begin]) <= 30
+
+    def _neighbours(self, y: int) -> list[list[int]]:
         """Columns of the nearest support on the sides that may speak, for every pixel of a row."""
         columns, max_gap = np.flatnonzero(self.support[y]), self.settings.max_gap_px
         found = []
@@ -46,11 +49,11 @@ class SlowFill:
         return found
 
     def _fill_piece(self, y: int, columns: NDArray, who: list[int]) -> NDArray:
-        centre, grey = columns.mean(), self.picture[y, columns].mean()
-        layer, distance = min((self.disparity[y, u], abs(u - centre)) for u in who)
+        middle, grey = columns.mean(), self.picture[y, columns].mean()
+        layer, distance = min((self.disparity[y, u], abs(u - middle)) for u in who)
         equations = []
-        for v, u in self._asked(y, centre, who):
-            dx, dy, d = u - centre, v - y, float(self.disparity[v, u] - layer)
+        for v, u in self._asked(y, middle, who):
+            dx, dy, d = u - middle, v - y, float(self.disparity[v, u] - layer)
             if abs(d) < self.settings.layer_px + self.settings.layer_growth * abs(dx):
                 far = (math.hypot(dx, dy) - distance) / (0.4 * self.radius)
                 far += abs(self.picture[v, u] - grey) / self.settings.grey_scale
@@ -58,16 +61,16 @@ class SlowFill:
                 equations.append((weight, dx, dy, d))
         value, slope = plane_at_origin(np.array(equations), self.settings.slope_penalty_px2)
         d = np.array(equations)[:, 3]
-        return layer + np.clip(value + slope * (columns - centre), d.min() - 1.0, d.max() + 1.0)
+        return layer + np.clip(value + slope * (columns - middle), d.min() - 1.0, d.max() + 1.0)
 
-    def _asked(self, y: int, centre: float, who: list[int]) -> list[tuple[int, int]]:
+    def _asked(self, y: int, middle: float, who: list[int]) -> list[tuple[int, int]]:
         """Every third support on both sides of who speaks, up to the piece's middle inwards."""
         height, width = self.support.shape
         up = max(round(0.3 * self.radius) // 3, 1) * 3
         asked = []
         for first in who:
-            outwards = 1 if first > centre else -1
-            inwards = min(int(abs(first - centre) - 0.5), self.radius) // 3 * 3
+            outwards = 1 if first > middle else -1
+            inwards = min(int(abs(first - middle) - 0.5), self.radius) // 3 * 3
             for v in range(y - up, y + up + 1, 3):
                 for k in range(-inwards, self.radius + 1, 3):
                     u = first + outwards * k

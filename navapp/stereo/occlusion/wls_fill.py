@@ -3,8 +3,8 @@
 In the left view an interior occlusion continues what stands on its left, a border occlusion what
 stands on its right, a mismatch what stands on both. A plane is fitted to matched pixels of that
 side: near the gap, of the background's layer, of similar brightness, and confident. Only measured
-pixels speak, so no error is carried along a gap and rows can be filled in any order. Each row of a
-gap is filled in pieces, which end where the picture's brightness changes.
+pixels take part, so no error is carried along a gap and rows can be filled in any order. Each row
+of a gap is filled in pieces, which end after 16 px or where the picture's brightness changes.
 """
 
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ _SPREAD_STEP = 3
 class FillSettings:
     """How the fit works."""
 
-    # of support beyond the gap; None: grows with the spread of disparities.
+    # how far support reaches beyond the gap; None: the further, the wider disparities spread.
     radius_px: int | None = None
     # a pixel further from its permitted neighbour stays unknown; None: the width of the map.
     max_gap_px: int | None = None
@@ -75,7 +75,7 @@ def fill_gaps(
         settings: of the fit.
 
     Returns:
-        Filled pixels have their class as origin. What nothing may speak for is unknown.
+        Filled pixels have their class as origin. What no match may fill is unknown.
 
     Raises:
         ValueError: sizes that differ.

@@ -1,4 +1,4 @@
-"""Compiled occlusion filling: planes fitted to what may speak for short pieces of a row."""
+"""Compiled occlusion filling: planes fitted for short pieces of a row."""
 
 from typing import NamedTuple
 
@@ -42,13 +42,13 @@ class Rules(NamedTuple):
 
 
 class Piece(NamedTuple):
-    """Neighbouring pixels of a row for which the same matches speak."""
+    """Neighbouring pixels of a row, alike in grey, that are filled from the same matches."""
 
     row: int
     middle: float  # column
     grey: float  # mean
-    layer_px: float  # disparity of the farther match that speaks
-    near_px: float  # its distance from the middle
+    disparity_px: float  # of the farther one of the matches
+    neighbour_px: float  # distance of that match from the middle
 
 
 @njit(cache=True, nogil=True)
@@ -60,31 +60,31 @@ def fill_rows(scene: Scene, rules: Rules, first: int, step: int, told: NDArray[n
         rules: of the fit.
         first: row.
         step: between rows.
-        told: (h, w) in place: the disparity where something may speak for a classified pixel.
+        told: (h, w) in place: the disparity of a classified pixel that a match may fill.
     """
     height, width = told.shape
     on_left, on_right = np.empty(width, np.int64), np.empty(width, np.int64)
     for y in range(first, height, step):
-        _find_speakers(scene.is_support[y], scene.classes[y], rules.max_gap_px, on_left, on_right)
+        _find_neighbours(scene.is_support[y], scene.classes[y], rules.max_gap_px, on_left, on_right)
         begin = 0
         while begin < width:
             end = begin + 1
             if on_left[begin] >= 0 or on_right[begin] >= 0:
                 end = _find_end(scene.picture[y], begin, on_left, on_right)
-                speakers = on_left[begin], on_right[begin]
-                _fill_piece(scene, rules, y, speakers, begin, told[y, begin:end])
+                neighbours = on_left[begin], on_right[begin]
+                _fill_piece(scene, rules, y, neighbours, begin, told[y, begin:end])
             begin = end
 
 
 @njit(cache=True, nogil=True)
-def _find_speakers(
+def _find_neighbours(
     is_support: NDArray[np.bool_],
     classes: NDArray[np.uint8],
-    max_gap: int,
+    max_gap_px: int,
     on_left: NDArray[np.int64],
     on_right: NDArray[np.int64],
 ) -> None:
-    """Columns of the nearest support that may speak for each pixel to fill of a row, or -1.
+    """Columns of the nearest matches from which each pixel of a row may be filled, or -1.
 
     Border occlusions are filled from the right, interior ones from the left, mismatches from both.
     """
@@ -92,13 +92,13 @@ def _find_speakers(
     near = -1
     for x in range(width):
         near = x if is_support[x] else near
-        may_speak = near >= 0 and x - near <= max_gap and classes[x] >= _INTERIOR
-        on_left[x] = near if may_speak else -1
+        is_from_left = classes[x] == _INTERIOR or classes[x] == _MISMATCH
+        on_left[x] = near if is_from_left and near >= 0 and x - near <= max_gap_px else -1
     near = -1
     for x in range(width - 1, -1, -1):
         near = x if is_support[x] else near
-        is_from_right = (classes[x] == _BORDER) | (classes[x] == _MISMATCH)
-        on_right[x] = near if is_from_right and near >= 0 and near - x <= max_gap else -1
+        is_from_right = classes[x] == _BORDER or classes[x] == _MISMATCH
+        on_right[x] = near if is_from_right and near >= 0 and near - x <= max_gap_px else -1
 
 
 @njit(cache=True, nogil=True)
@@ -122,34 +122,33 @@ def _fill_piece(
     scene: Scene,
     rules: Rules,
     y: int,
-    speakers: tuple[int, int],
+    neighbours: tuple[int, int],
     begin: int,
     filled: NDArray[np.float32],
 ) -> None:
-    """Fill a piece, from column `begin` on, with one plane through what is of the farther layer.
+    """Fill a piece, from column `begin` on, with one plane through the farther match's layer.
 
     The plane stays within what was measured, and a little beyond.
     """
-    middle, grey = begin + 0.5 * (len(filled) - 1), 0.0
-    for k in range(len(filled)):
-        grey += scene.picture[y, begin + k] / len(filled)
-    layer_px, near_px = np.inf, 0.0
-    for u in speakers:
-        if u >= 0 and scene.disparity[y, u] < layer_px:
-            layer_px, near_px = scene.disparity[y, u], abs(u - middle)
-    piece = Piece(y, middle, grey, layer_px, near_px)
+    middle = begin + 0.5 * (len(filled) - 1)
+    grey = scene.picture[y, begin : begin + len(filled)].mean()
+    disparity_px, neighbour_px = np.inf, 0.0
+    for u in neighbours:
+        if u >= 0 and scene.disparity[y, u] < disparity_px:
+            disparity_px, neighbour_px = scene.disparity[y, u], abs(u - middle)
+    piece = Piece(y, middle, grey, disparity_px, neighbour_px)
     sums, low, high = np.zeros(9), np.inf, -np.inf
     for row in range(-rules.n_rows, rules.n_rows + 1):
         v = y + row * STRIDE_PX
         if 0 <= v < len(scene.disparity):
-            for u, outwards in ((speakers[0], -1), (speakers[1], 1)):
+            for u, outwards in ((neighbours[0], -1), (neighbours[1], 1)):
                 if u >= 0:
                     ends = _add_support(scene, rules, piece, v, u, outwards, sums)
                     low, high = min(low, ends[0]), max(high, ends[1])
     value, slope = _fit_plane(sums / sums[0], rules.slope_penalty_px2)
     for k in range(len(filled)):
         d = value + slope * (begin + k - middle)
-        filled[k] = layer_px + min(max(d, low - _BEYOND_PX), high + _BEYOND_PX)
+        filled[k] = disparity_px + min(max(d, low - _BEYOND_PX), high + _BEYOND_PX)
 
 
 @njit(cache=True, nogil=True)
@@ -158,32 +157,32 @@ def _add_support(
     rules: Rules,
     piece: Piece,
     v: int,
-    first: int,
+    column: int,
     outwards: int,
     sums: NDArray[np.float64],
 ) -> tuple[float, float]:
-    """Add one side of row `v` to the sums of `_fit_plane`; the least and the largest disparity.
+    """Add one side of row `v` to the sums; the least and the largest difference from the layer.
 
-    Asked is what stands around column `first`, on the piece's side up to its middle. A weight falls
-    with the difference in grey levels, and with the distance, counted from that of the match whose
-    layer it is. Only what differs little from the layer speaks.
+    That is the support around a neighbour's column, on the piece's side up to its middle, as far as
+    it differs little from the layer. A weight falls with the difference in grey levels, and with
+    the distance, counted from that of the match whose layer it is. Sums as of `_fit_plane`.
     """
     disparity, is_support = scene.disparity[v], scene.is_support[v]
     picture, confidence = scene.picture[v], scene.confidence[v]
     dy = float(v - piece.row)
     low, high = np.inf, -np.inf
-    inwards = min(int(abs(first - piece.middle) - 0.5), rules.radius_px) // STRIDE_PX * STRIDE_PX
+    inwards = min(int(abs(column - piece.middle) - 0.5), rules.radius_px) // STRIDE_PX * STRIDE_PX
     for k in range(-inwards, rules.radius_px + 1, STRIDE_PX):
-        u = first + outwards * k
+        u = column + outwards * k
         if not 0 <= u < len(disparity) or not is_support[u]:
             continue
-        dx, d = u - piece.middle, disparity[u] - piece.layer_px
+        dx, d = u - piece.middle, disparity[u] - piece.disparity_px
         if abs(d) >= rules.layer_px + rules.layer_growth * abs(dx):
             continue
-        far = (np.sqrt(dx * dx + dy * dy) - piece.near_px) / rules.distance_px
-        far += abs(picture[u] - piece.grey) / rules.grey_scale
+        exponent = (np.sqrt(dx * dx + dy * dy) - piece.neighbour_px) / rules.distance_px
+        exponent += abs(picture[u] - piece.grey) / rules.grey_scale
         trust = confidence[u] if confidence[u] > 0.0 else 0.0
-        w = (trust + _LEAST_TRUST) * np.exp(np.float32(-far))
+        w = (trust + _LEAST_TRUST) * np.exp(-exponent)
         sums[0] += w
         sums[1] += w * dx
         sums[2] += w * dy

@@ -35,7 +35,8 @@ _FAR_PX = 3.0
 # Noise below this is as good as none: other errors are larger.
 _SMALL_NOISE_PX = 0.05
 
-# Of a whole scene. Further away than this, a refined value is not the same surface's any more.
+# Of a whole scene: the Gaussian that makes its support, and how far a refined value may lie from
+# the coarse one to be of the same surface.
 _SUPPORT_SIGMA_PX, _CLOSE_PX = 2.0, 1.0
 # A window over an edge mixes two surfaces: there the coarse value stands.
 _WINDOW_PX, _SAME_SURFACE_PX = 11, 3.0

@@ -217,6 +217,17 @@ def test_a_wide_gap_beside_few_matches_is_filled(n_known: int) -> None:
     assert np.isnan(after.disparity_px[2]).all()
 
 
+def test_a_gap_of_any_width_is_filled_from_both_sides() -> None:
+    """The far side weighs by its distance from the piece, however much nearer the other one is."""
+    line = np.full((7, 900), np.nan)
+    line[:, :40], line[:, -40:] = 12.0, 14.0
+    classes = np.where(np.isnan(line), Origin.MISMATCH_FILLED, 0).astype(np.uint8)
+    grey, sure_ = np.full(line.shape, 80, np.uint8), np.ones(line.shape, np.float32)
+    after = fill_wls(as_map(line), grey, sure_, classes, FillSettings(radius_px=8))
+    told = after.disparity_px[3, 40:-40]
+    assert ((told > 10.9) & (told < 15.1)).all()
+
+
 @pytest.mark.parametrize("shape", [(1, 1), (1, 8), (2, 8), (3, 8), (5, 2)])
 def test_small_maps_are_filled(shape: tuple[int, int]) -> None:
     disparity = np.full(shape, 10.0)
