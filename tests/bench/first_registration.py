@@ -24,7 +24,6 @@ from functools import partial
 from pathlib import Path
 from unittest import mock
 
-import cv2
 import numpy as np
 
 from navapp.evaluation import compute_mean_tre_mm
@@ -42,6 +41,7 @@ from sim_devices.scenario import Scenario
 from sim_devices.sensor import SensorModel
 from sim_devices.world import World
 from tests.knees import femur_of
+from tests.recorded import read_frames, read_picture
 
 _SEQUENCES = ("registration", "patient", "instrument")
 _OFF_SHARE = 0.15
@@ -204,16 +204,10 @@ def cases(folder: Path, first_seed: int, n_seeds: int) -> Iterator[Case]:
 
 
 def _recorded(folder: Path, bone: BoneModel, rig: StereoRig) -> Case:
-    frames = []
-    for entry in json.loads((folder / "truth.json").read_text(encoding="utf-8"))["frames"]:
-        number = f"{entry['index']:04d}"
-        left, right, mask = (
-            cv2.imread(str(next(folder.glob(f"{name}_{number}.*"))), cv2.IMREAD_COLOR)
-            for name in ("left", "right", "bone_mask_left")
-        )
-        true = RigidTransform("left", "femur", entry["T_leftcam_from_ct"]["femur"])
-        group = f"{folder.parent.name}/{folder.name}"
-        frames.append(Frame(group, left, right, mask[..., 0] > 0, true))
+    group, frames = f"{folder.parent.name}/{folder.name}", []
+    for one in read_frames(folder):
+        is_bone = read_picture(folder, "bone_mask_left", one.number)[..., 0] > 0
+        frames.append(Frame(group, one.left, one.right, is_bone, one.truth))
     cone = json.loads((folder / "prior.json").read_text(encoding="utf-8"))["approach_cone"]
     return Case(rig, bone, np.array(cone["axis"]), float(cone["half_angle_deg"]), frames)
 

@@ -14,7 +14,6 @@ on simulated knees of the seeds from 1, and judged on others.
 """
 
 import argparse
-import json
 import os
 import sys
 from collections.abc import Iterator
@@ -39,6 +38,7 @@ from sim_devices.scenario import Scenario
 from sim_devices.sensor import SensorModel
 from tests.knees import SimulatedKnee, stepped_camera
 from tests.pictures import Pictures
+from tests.recorded import read_frames, read_picture
 
 Mask = NDArray[np.bool_]
 # By thresholds (px, mm): pixels of the occluder marked and in all, of the bone, guesses and all.
@@ -210,19 +210,14 @@ def _sequences(
 
 def _recorded(phantom: Path) -> Iterator[Case]:
     folder = phantom / "instrument"
-    for entry in json.loads((folder / "truth.json").read_text())["frames"]:
-        index = entry["index"]
-        left, right = (
-            cv2.imread(str(folder / f"{eye}_{index:04d}.jpg")) for eye in ("left", "right")
-        )
+    for frame in read_frames(folder):
         occluder, bone = (
-            cv2.imread(str(folder / f"{kind}_mask_left_{index:04d}.png"), cv2.IMREAD_GRAYSCALE)
-            > 127
+            read_picture(folder, f"{kind}_mask_left", frame.number)[..., 0] > 127
             for kind in ("occluder", "bone")
         )
-        truth = RigidTransform("left", "femur", entry["T_leftcam_from_ct"]["femur"])
-        pictures = Pictures(left, right, index)
-        yield Case(f"{phantom.name}_{index:02d}", pictures, truth, occluder, bone)
+        pictures = Pictures(frame.left, frame.right, frame.number)
+        name = f"{phantom.name}_{frame.number:02d}"
+        yield Case(name, pictures, frame.truth, occluder, bone)
 
 
 def _simulated(knee: SimulatedKnee) -> Iterator[Case]:

@@ -9,7 +9,6 @@ pose, where no chain has lost it in frames before. Errors are those of all poses
 """
 
 import argparse
-import json
 import os
 import sys
 import tempfile
@@ -35,6 +34,7 @@ from navapp.values import AspectGraph, BoneModel, Prior, StereoPictures
 from sim_devices.scenario import Scenario
 from tests.knees import SimulatedKnee
 from tests.pictures import Pictures
+from tests.recorded import read_frames
 
 _MANY = 20_000
 _BONE, _SITUATIONS = "femur", ("patient", "instrument")
@@ -90,21 +90,12 @@ def recorded(folder: Path) -> Iterator[Sequence]:
         for situation in _SITUATIONS:
             yield Sequence(
                 read_rig(phantom / "rig.yml"), plan.bones[_BONE], plan.aspects.get(_BONE),
-                read_prior(phantom / situation / "prior.json"), list(read(phantom / situation)),
+                read_prior(phantom / situation / "prior.json"),
+                [
+                    (Pictures(one.left, one.right, k * _PERIOD_NS), one.truth)
+                    for k, one in enumerate(read_frames(phantom / situation, _BONE))
+                ],
             )  # fmt: skip
-
-
-def read(sequence: Path) -> Iterator[tuple[StereoPictures, RigidTransform]]:
-    """Each frame of a recorded sequence with its truth."""
-    import cv2
-
-    for number, entry in enumerate(json.loads((sequence / "truth.json").read_text())["frames"]):
-        left, right = (
-            cv2.imread(str(sequence / f"{eye}_{entry['index']:04d}.jpg"))
-            for eye in ("left", "right")
-        )
-        true = RigidTransform("left", _BONE, entry["T_leftcam_from_ct"][_BONE])
-        yield Pictures(left, right, number * _PERIOD_NS), true
 
 
 def simulated(seed: int) -> Sequence:

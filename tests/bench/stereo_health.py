@@ -8,7 +8,6 @@ the matched points say, what was said of it, and what the turn costs.
 """
 
 import argparse
-import json
 import os
 import sys
 import time
@@ -16,7 +15,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import cv2
 import numpy as np
 
 from navapp.evaluation import compute_mean_tre_mm
@@ -30,6 +28,7 @@ from navapp.tracking.surface_meter import WIDE_VIEW
 from navapp.values import BoneModel, Reason, Status
 from tests.bench.tracker_parts import GOAL, TrackerParts
 from tests.pictures import Pictures
+from tests.recorded import read_frames
 
 OFFSETS_PX = (0.0, 0.15, 0.3, 0.5, -0.5, 1.0)
 # Of a pair's pictures, beside its rows.
@@ -81,13 +80,8 @@ def turned(rig: StereoRig, row_offset_px: float) -> StereoRig:
 def _follow_points(rig: StereoRig, bone: BoneModel, sequence: Path) -> Iterator[Row]:
     """Every frame from its own truth."""
     tracker = TrackerParts(rig, bone)
-    for entry in json.loads((sequence / "truth.json").read_text(encoding="utf-8"))["frames"]:
-        truth = RigidTransform("left", "femur", entry["T_leftcam_from_ct"]["femur"])
-        left, right = (
-            cv2.imread(str(sequence / f"{side}_{entry['index']:04d}.jpg"))
-            for side in ("left", "right")
-        )
-        pictures = Pictures(left, right)
+    for recorded in read_frames(sequence):
+        truth, pictures = recorded.truth, Pictures(recorded.left, recorded.right)
         tracked, _ = tracker.track(pictures, TrackState.at_rest(truth, 0), GOAL)
         frame = tracker.begin(pictures, truth, WIDE_VIEW)
         fit = tracker.find(frame)
