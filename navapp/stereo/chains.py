@@ -159,7 +159,7 @@ def _answer(
     if fill is None:
         return StereoAnswer(left, left, (), watch.timings)
     picture = pair.left[pair.box.slices]
-    classes = classify(left, evidence.right_px, evidence.right_x0, pair.geometry.width)
+    classes = classify(left, evidence.right_px, evidence.right_x0, pair.geometry.width, picture)
     if is_expected is not None:
         classes[~is_expected] = 0
     filled = fill_wls(left, picture, evidence.confidence, classes, fill)

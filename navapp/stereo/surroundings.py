@@ -16,7 +16,6 @@ from navapp.geometry.rectification import RectifiedPair
 from navapp.stereo.coarse import SURFACE_CENSUS, CoarseMap, CoarseMatch
 from navapp.stereo.matching.census_sgm import TwoViewDisparity, match_census
 from navapp.stereo.matching.search import crop
-from navapp.stereo.occlusion.bound_kernels import drop_beyond_bound
 from navapp.stereo.occlusion.classify import classify
 from navapp.stereo.occlusion.wls_fill import FillSettings, fill_gaps
 from navapp.values import DisparityMap, Origin, Surroundings
@@ -30,9 +29,6 @@ _BEYOND_PX = 2.0
 _NEAR_CENSUS = replace(SURFACE_CENSUS, radius_x=1, radius_y=1, max_difference_px=3.0, speckle_px=40)
 # A map to about a pixel needs no wider support.
 _FILL = FillSettings(radius_px=8)
-# A filled disparity may exceed the bound of its occlusion by so much, the error of edges;
-# disparities further apart belong to different surfaces.
-_EDGE_PX, _LAYER_PX = np.float32(2.0), np.float32(8.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,8 +59,7 @@ def match_nearer(coarse: CoarseMap, nearer: NearerSearch) -> CoarseMap:
 def fill_surroundings(coarse: CoarseMap) -> Surroundings:
     """The matches of a coarse map, their gaps filled by weighted least squares (`fill_gaps`).
 
-    What is filled nearer than its occlusion allows becomes unknown (`drop_beyond_bound`). A filled
-    pixel has its class as origin: it is a guess.
+    A filled pixel has its class as origin: it is a guess.
     """
     matched = coarse.matched
     if matched is None:
@@ -74,9 +69,8 @@ def fill_surroundings(coarse: CoarseMap) -> Surroundings:
     pair, found = matched.pair, matched.found
     # The half of an odd picture lacks its last column or row, the half of a box has it.
     picture = crop(pair.left, pair.box, (0, 0))
-    classes = classify(found.left, found.right_px, found.right_x0, pair.geometry.width)
+    classes = classify(found.left, found.right_px, found.right_x0, pair.geometry.width, picture)
     disparity_px, origin = fill_gaps(found.left, picture, found.confidence, classes, _FILL)
-    drop_beyond_bound(disparity_px, origin, _EDGE_PX, _LAYER_PX)
     return Surroundings(disparity_px, origin, coarse.box, matched.is_half, picture)
 
 

@@ -118,7 +118,7 @@ def steps_of(scene: Matched) -> dict[str, Callable[[], object]]:
     """Every step by name, each on the result of the one before."""
 
     def label() -> np.ndarray:
-        return classify(scene.left, scene.right_px, scene.right_x0, _WIDTH)
+        return classify(scene.left, scene.right_px, scene.right_x0, _WIDTH, scene.picture)
 
     classes = label()
 

@@ -28,7 +28,12 @@ def seen_from_right_reference(
 
 
 def classes_reference(
-    disparity: NDArray[np.float32], is_matched: NDArray[np.bool_], x0: int, right_px, right_x0: int
+    disparity: NDArray[np.float32],
+    is_matched: NDArray[np.bool_],
+    x0: int,
+    right_px: NDArray[np.float64],
+    right_x0: int,
+    picture: NDArray[np.uint8],
 ) -> NDArray[np.uint8]:
     """(h, w) 0 where a match stands, else what filled pixels will be; all inside the picture."""
     height, width = disparity.shape
@@ -45,6 +50,8 @@ def classes_reference(
             elif not is_matched[y, x]:
                 is_seen = (np.abs(points_at - x) <= 0.6).any()
                 classes[y, x] = Origin.MISMATCH_FILLED if is_seen else Origin.FILLED_INTERIOR
+        like_behind = _looks_like_behind(disparity[y], classes[y] == 0, picture[y].astype(int))
+        classes[y, like_behind] = Origin.FILLED_INTERIOR
         for x in np.flatnonzero(classes[y] == Origin.FILLED_INTERIOR):
             stands = np.flatnonzero(classes[y] == 0)
             before, after = stands[stands < x], stands[stands > x]
@@ -54,6 +61,26 @@ def classes_reference(
             if not is_possible:
                 classes[y, x] = Origin.MISMATCH_FILLED
     return classes
+
+
+def _looks_like_behind(
+    disparity: NDArray[np.float32], stands: NDArray[np.bool_], grey: NDArray[np.int64]
+) -> list[int]:
+    """Columns of matches at left edges that look like what is left of the edge."""
+    found: list[int] = []
+    before = None
+    for edge in np.flatnonzero(stands):
+        if edge in found or not 6 <= edge <= len(stands) - 9:
+            continue
+        is_edge = before is not None and disparity[edge] - disparity[before] >= 2.0
+        before = edge
+        for x in range(edge, edge + 3 if is_edge else edge):
+            sides = grey[edge - 6 : edge], grey[edge + 3 : edge + 9]
+            to_behind, to_nearer = (abs(side - grey[x]).min() for side in sides)
+            if not stands[x] or to_behind + 10 >= to_nearer:
+                break
+            found.append(x)
+    return found
 
 
 def _end_of_strip(disparity: NDArray, is_matched: NDArray, x0: int) -> float | None:

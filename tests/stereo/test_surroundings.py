@@ -138,16 +138,6 @@ def test_without_a_wide_gap_nothing_nearer_is_looked_for(
         assert len(asked) == n_asked
 
 
-def test_filled_pixels_beyond_their_bound_become_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
-    def drop_all_guesses(disparity, origin, edge_px, layer_px) -> None:
-        disparity[origin > Origin.MATCHED], origin[origin > Origin.MATCHED] = np.nan, 0
-
-    monkeypatch.setattr(surroundings, "drop_beyond_bound", drop_all_guesses)
-    found = fill(scene(INSIDE), FULL)
-    assert set(np.unique(found.origin)) == {Origin.UNKNOWN, Origin.MATCHED}
-    assert np.isnan(found.disparity_px[found.origin == Origin.UNKNOWN]).all()
-
-
 @pytest.mark.parametrize("band_px", [FULL, HALF])
 def test_pictures_that_disagree_tell_nothing(band_px: tuple[float, float]) -> None:
     coarse = match_coarsely(swapped(scene(INSIDE)), band_px)

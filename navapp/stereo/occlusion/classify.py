@@ -23,6 +23,7 @@ def classify(
     right_px: NDArray[np.float32],
     right_x0: int,
     picture_width: int,
+    picture: NDArray[np.uint8],
 ) -> NDArray[np.uint8]:
     """Class of every pixel that is not, or not believably, matched.
 
@@ -31,19 +32,22 @@ def classify(
         right_px: (h, W) float32 disparity of the right view in the same rows, NaN where unknown.
         right_x0: column of its first pixel in the rectified right picture.
         picture_width: of the rectified pictures.
+        picture: (h, w) rectified grey left picture over the map.
 
     Returns:
         (h, w) 0 where the match stands and outside the picture, else the `Origin` that a filled
         pixel gets. A class on a matched pixel withdraws that match.
 
     Raises:
-        ValueError: another number of rows.
+        ValueError: another number of rows, or a picture of another size.
 
     Source: the paper, section 3.2 (border and non-border occlusions).
     """
     shape = left.disparity_px.shape
     if right_px.shape[0] != shape[0]:
         raise ValueError("classify needs both views over the same rows")
+    if picture.shape != shape:
+        raise ValueError("classify needs a grey picture of the map's size")
     disparity = np.ascontiguousarray(left.disparity_px, dtype=np.float32)
     origin = np.ascontiguousarray(left.origin)
     right_px = np.ascontiguousarray(right_px, dtype=np.float32)
@@ -51,7 +55,9 @@ def classify(
     in_two_shares(lambda *rows: mark_seen(right_px, right_x0 - left.x, *rows, seen))
     find_begins(disparity, origin, left.x, begins)
     classes = np.empty(shape, dtype=np.uint8)
-    in_two_shares(lambda *rows: class_rows(disparity, origin, begins, seen, *rows, classes))
+    picture = np.ascontiguousarray(picture)
+    known = disparity, origin, begins, seen, picture
+    in_two_shares(lambda *rows: class_rows(*known, *rows, classes))
     classes[:, : max(-left.x, 0)] = 0
     classes[:, max(picture_width - left.x, 0) :] = 0
     return classes

@@ -19,6 +19,9 @@ _RUN_PX = 6
 _STRIP_SLACK_PX = 8.0
 # The strip's end is agreed over this many rows above and below.
 _STRIP_ROWS = 4
+# At the left edge of something nearer, by so much, so many pixels may show what is behind it. Beside
+# them so many on either side tell what each looks like; so many grey levels differ clearly.
+_JUMP_PX, _OVER_PX, _LOOK_PX, _CLEARLY_GREY = 2.0, 3, 6, 10
 
 
 @njit(cache=True, nogil=True)
@@ -89,6 +92,7 @@ def class_rows(
     origin: NDArray[np.uint8],
     begins: NDArray[np.int64],
     seen: NDArray[np.bool_],
+    picture: NDArray[np.uint8],
     first: int,
     step: int,
     classes: NDArray[np.uint8],
@@ -100,6 +104,7 @@ def class_rows(
         origin: (h, w) of the matches.
         begins: (h,) where the border strip ends.
         seen: (h, w) of `mark_seen`.
+        picture: (h, w) grey.
         first: row.
         step: between rows.
         classes: (h, w) in place; 0 where a match stands.
@@ -114,7 +119,32 @@ def class_rows(
                 row[x] = 0
             else:
                 row[x] = _MISMATCH if seen[y, x] else _INTERIOR
+        _withdraw_background(disparity[y], picture[y], row)
         _keep_possible(disparity[y], row)
+
+
+@njit(cache=True, nogil=True)
+def _withdraw_background(
+    disparity: NDArray[np.float32], grey: NDArray[np.uint8], row: NDArray[np.uint8]
+) -> None:
+    """Matches at left edges that look like what is behind the edge become interior occlusions.
+
+    A matching window hangs over the edge and gives what is behind it the nearer one's disparity.
+    """
+    before = -1
+    for x in range(_LOOK_PX, len(row) - _OVER_PX - _LOOK_PX + 1):
+        if row[x] != 0:
+            continue
+        is_edge = before >= 0 and disparity[x] - disparity[before] >= _JUMP_PX
+        before, u = x, x
+        while is_edge and u < x + _OVER_PX and row[u] == 0:
+            to_behind = to_nearer = 255
+            for k in range(_LOOK_PX):
+                to_behind = min(to_behind, abs(np.int64(grey[x - 1 - k]) - grey[u]))
+                to_nearer = min(to_nearer, abs(np.int64(grey[x + _OVER_PX + k]) - grey[u]))
+            is_edge = to_behind + _CLEARLY_GREY < to_nearer
+            row[u] = _INTERIOR if is_edge else row[u]
+            u += 1
 
 
 @njit(cache=True, nogil=True)

@@ -11,6 +11,8 @@ pytestmark = pytest.mark.kernel
 
 HEIGHT, WIDTH = 50, 160
 NEAR = 30.0
+# Nothing is withdrawn for its looks.
+BLANK = np.full((HEIGHT, WIDTH), 60, dtype=np.uint8)
 # The square in the left view, and in the right one.
 ROWS, LEFT_COLUMNS, RIGHT_COLUMNS = slice(12, 40), slice(80, 115), slice(50, 85)
 
@@ -85,7 +87,7 @@ def right_view_as_seen() -> np.ndarray:
 
 def test_the_strip_that_the_right_camera_does_not_see_is_a_border_occlusion() -> None:
     left, _ = found_views()
-    classes = classify(as_map(left), right_view_as_seen(), 0, WIDTH)
+    classes = classify(as_map(left), right_view_as_seen(), 0, WIDTH, BLANK)
     is_strip = np.arange(WIDTH) - true_views()[0] < 0
     # The agreed end of a slanted strip is good to a pixel.
     assert (classes == Origin.FILLED_BORDER)[is_strip].mean() > 0.97
@@ -96,7 +98,7 @@ def test_what_the_square_hides_is_an_interior_occlusion() -> None:
     left, _ = found_views()
     hidden, _ = hidden_places()
     assert hidden.sum() > 200
-    classes = classify(as_map(left), right_view_as_seen(), 0, WIDTH)
+    classes = classify(as_map(left), right_view_as_seen(), 0, WIDTH, BLANK)
     is_interior = classes == Origin.FILLED_INTERIOR
     # A pixel at either end may still be within reach of a right pixel.
     assert is_interior[hidden].mean() > 0.9
@@ -105,7 +107,7 @@ def test_what_the_square_hides_is_an_interior_occlusion() -> None:
 
 def test_matches_stand() -> None:
     left, _ = found_views()
-    classes = classify(as_map(left), right_view_as_seen(), 0, WIDTH)
+    classes = classify(as_map(left), right_view_as_seen(), 0, WIDTH, BLANK)
     inside = np.isfinite(left) & (np.arange(WIDTH) > 20)
     assert (classes[inside] == 0).all()
 
@@ -113,7 +115,7 @@ def test_matches_stand() -> None:
 def test_the_rest_is_a_mismatch() -> None:
     left, _ = found_views()
     left[20:24, 130:136] = np.nan
-    classes = classify(as_map(left), right_view_as_seen(), 0, WIDTH)
+    classes = classify(as_map(left), right_view_as_seen(), 0, WIDTH, BLANK)
     assert (classes[20:24, 130:136] == Origin.MISMATCH_FILLED).all()
 
 
@@ -128,14 +130,14 @@ def test_only_left_of_something_nearer_is_an_interior_occlusion(
     line[:, 30:] = on_right
     line[:, 25:30] = np.nan
     nobody = np.full((5, 60), np.nan, dtype=np.float32)
-    classes = classify(as_map(line, x=60), nobody, 60, 200)
+    classes = classify(as_map(line, x=60), nobody, 60, 200, BLANK[:5, :60])
     assert (classes[:, 25:30] == expected).all()
 
 
 def test_accidental_matches_in_the_strip_are_withdrawn() -> None:
     left, _ = found_views()
     left[30:33, 4:8] = 3.0
-    classes = classify(as_map(left), right_view_as_seen(), 0, WIDTH)
+    classes = classify(as_map(left), right_view_as_seen(), 0, WIDTH, BLANK)
     assert (classes[30:33, 4:8] == Origin.FILLED_BORDER).all()
 
 
@@ -144,7 +146,7 @@ def test_a_box_inside_the_picture_has_no_border_strip() -> None:
     box = as_map(left[:, 30:], x=30)
     box.disparity_px[:, :10] = np.nan
     box.origin[:, :10] = Origin.UNKNOWN
-    classes = classify(box, right_view_as_seen(), 0, WIDTH)
+    classes = classify(box, right_view_as_seen(), 0, WIDTH, BLANK[:, 30:])
     assert not (classes == Origin.FILLED_BORDER).any()
     assert (classes[:10, :10] != 0).all()
 
@@ -152,9 +154,9 @@ def test_a_box_inside_the_picture_has_no_border_strip() -> None:
 @pytest.mark.parametrize("first", [0, 10])
 def test_boxes_of_both_views_meet_where_their_columns_say(first: int) -> None:
     left, _ = found_views()
-    whole = classify(as_map(left), right_view_as_seen(), 0, WIDTH)
+    whole = classify(as_map(left), right_view_as_seen(), 0, WIDTH, BLANK)
     part, right_part = as_map(left[:, 40:], x=40), right_view_as_seen()[:, first:]
-    box = classify(part, right_part, first, WIDTH)
+    box = classify(part, right_part, first, WIDTH, BLANK[:, 40:])
     np.testing.assert_array_equal(box, whole[:, 40:])
 
 
@@ -162,7 +164,8 @@ def test_the_mirrored_right_view_obeys_the_same_rules() -> None:
     _, right = found_views()
     left_as_seen = true_views()[0].astype(np.float32)
     _, hidden = hidden_places()
-    classes = classify(mirrored(as_map(right), WIDTH), left_as_seen[:, ::-1], 0, WIDTH)[:, ::-1]
+    view = mirrored(as_map(right), WIDTH)
+    classes = classify(view, left_as_seen[:, ::-1], 0, WIDTH, BLANK)[:, ::-1]
     is_strip = np.arange(WIDTH) + true_views()[1] > WIDTH - 1
     assert (classes == Origin.FILLED_BORDER)[is_strip].mean() > 0.9
     assert (classes == Origin.FILLED_INTERIOR)[hidden].mean() > 0.9
@@ -172,14 +175,14 @@ def test_the_mirrored_right_view_obeys_the_same_rules() -> None:
 
 def test_a_map_without_matches_is_all_unmatched() -> None:
     nothing = np.full((8, 20), np.nan, dtype=np.float32)
-    classes = classify(as_map(nothing), nothing, 0, 20)
+    classes = classify(as_map(nothing), nothing, 0, 20, BLANK[:8, :20])
     assert (classes == Origin.MISMATCH_FILLED).all()
 
 
 def test_what_lies_outside_the_picture_has_no_class() -> None:
     nothing = np.full((8, 40), np.nan)
     nobody = np.empty((8, 0), dtype=np.float32)
-    classes = classify(as_map(nothing, x=-10), nobody, 0, 20)
+    classes = classify(as_map(nothing, x=-10), nobody, 0, 20, BLANK[:8, :40])
     assert (classes[:, :10] == 0).all()
     assert (classes[:, 10:30] != 0).all()
     assert (classes[:, 30:] == 0).all()
@@ -188,7 +191,38 @@ def test_what_lies_outside_the_picture_has_no_class() -> None:
 def test_views_of_different_rows_are_refused() -> None:
     left, _ = found_views()
     with pytest.raises(ValueError, match="same rows"):
-        classify(as_map(left), right_view_as_seen()[1:], 0, WIDTH)
+        classify(as_map(left), right_view_as_seen()[1:], 0, WIDTH, BLANK)
+
+
+def test_a_picture_of_another_size_is_refused() -> None:
+    left, _ = found_views()
+    with pytest.raises(ValueError, match="grey picture of the map's size"):
+        classify(as_map(left), right_view_as_seen(), 0, WIDTH, BLANK[:, 1:])
+
+
+def edge_that_hangs_over() -> tuple[DisparityMap, np.ndarray]:
+    """Matches of something nearer from column 30 on, which is seen from column 32 on only."""
+    line = np.full((5, 60), 20.0)
+    line[:, 30:] = 30.0
+    line[:, 22:30] = np.nan
+    picture = np.full(line.shape, 60, dtype=np.uint8)
+    picture[:, 32:] = 90
+    return as_map(line, x=60), picture
+
+
+def test_matches_that_look_like_what_is_behind_the_edge_are_interior_occlusions() -> None:
+    found, picture = edge_that_hangs_over()
+    nobody = np.full((5, 60), np.nan, dtype=np.float32)
+    classes = classify(found, nobody, 60, 200, picture)
+    assert (classes[:, 22:32] == Origin.FILLED_INTERIOR).all()
+    assert not classes[:, :22].any()
+    assert not classes[:, 32:].any()
+    # Neither when both look alike, nor where what is on the right is farther.
+    picture[:, 32:] = 66
+    assert not classify(found, nobody, 60, 200, picture)[:, 30:].any()
+    found, picture = edge_that_hangs_over()
+    found.disparity_px[:, 30:] = 10.0
+    assert not classify(found, nobody, 60, 200, picture)[:, 30:].any()
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -200,11 +234,13 @@ def test_classes_are_those_of_the_reference(seed: int) -> None:
     right = np.where(rng.random((12, 70)) < 0.3, np.nan, rng.uniform(5.0, 25.0, (12, 70)))
     right, x0, right_x0 = right.astype(np.float32), (0, 6)[seed % 2], (0, -9)[seed // 2 % 2]
     found = as_map(left, x=x0)
-    classes = classify(found, right, right_x0, 200)
-    expected = classes_reference(
-        found.disparity_px, found.is_matched, x0, right.astype(float), right_x0
-    )
-    np.testing.assert_array_equal(classes, expected)
+    # What looks alike begins two columns right of what is matched alike.
+    picture = np.repeat(rng.integers(40, 200, (12, 10)), 8, axis=1).astype(np.uint8)
+    picture = np.roll(picture, 2, axis=1)
+    classes = classify(found, right, right_x0, 200, picture)
+    given = found.disparity_px, found.is_matched, x0, right.astype(float), right_x0
+    np.testing.assert_array_equal(classes, classes_reference(*given, picture))
+    assert (classes != classes_reference(*given, np.zeros_like(picture))).sum() > 5
     assert len(np.unique(classes)) == 4
 
 

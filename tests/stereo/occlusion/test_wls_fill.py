@@ -38,15 +38,16 @@ def sure() -> np.ndarray:
 def filled_left() -> tuple[DisparityMap, DisparityMap]:
     """The left view before and after."""
     before = as_map(found_views()[0])
-    classes = classify(before, true_views()[1].astype(np.float32), 0, WIDTH)
-    return before, fill_wls(before, picture_of(LEFT_COLUMNS), sure(), classes)
+    picture = picture_of(LEFT_COLUMNS)
+    classes = classify(before, true_views()[1].astype(np.float32), 0, WIDTH, picture)
+    return before, fill_wls(before, picture, sure(), classes)
 
 
 def filled_right() -> DisparityMap:
     before = mirrored(as_map(found_views()[1]), WIDTH)
     other = np.ascontiguousarray(true_views()[0][:, ::-1].astype(np.float32))
-    classes = classify(before, other, 0, WIDTH)
     picture = np.ascontiguousarray(picture_of(RIGHT_COLUMNS)[:, ::-1])
+    classes = classify(before, other, 0, WIDTH, picture)
     return mirrored(fill_wls(before, picture, sure(), classes), WIDTH)
 
 
