@@ -19,8 +19,8 @@ _RUN_PX = 6
 _STRIP_SLACK_PX = 8.0
 # The strip's end is agreed over this many rows above and below.
 _STRIP_ROWS = 4
-# At the left edge of something nearer, by so much, so many pixels may show what is behind it. Beside
-# them so many on either side tell what each looks like; so many grey levels differ clearly.
+# At the left edge of something nearer, by so much, so many pixels may show what is behind it. So
+# many on either side of them tell what each looks like; so many grey levels differ clearly.
 _JUMP_PX, _OVER_PX, _LOOK_PX, _CLEARLY_GREY = 2.0, 3, 6, 10
 
 
