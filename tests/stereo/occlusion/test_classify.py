@@ -234,9 +234,9 @@ def test_classes_are_those_of_the_reference(seed: int) -> None:
     right = np.where(rng.random((12, 70)) < 0.3, np.nan, rng.uniform(5.0, 25.0, (12, 70)))
     right, x0, right_x0 = right.astype(np.float32), (0, 6)[seed % 2], (0, -9)[seed // 2 % 2]
     found = as_map(left, x=x0)
-    # What looks alike begins two columns right of what is matched alike.
-    picture = np.repeat(rng.integers(40, 200, (12, 10)), 8, axis=1).astype(np.uint8)
-    picture = np.roll(picture, 2, axis=1)
+    # What looks alike begins two columns right of what is matched alike; some like neither side.
+    picture = np.roll(np.repeat(rng.integers(40, 200, (12, 10)), 8, axis=1), 2, axis=1)
+    picture = np.where(rng.random(picture.shape) < 0.2, 255, picture).astype(np.uint8)
     classes = classify(found, right, right_x0, 200, picture)
     given = found.disparity_px, found.is_matched, x0, right.astype(float), right_x0
     np.testing.assert_array_equal(classes, classes_reference(*given, picture))
