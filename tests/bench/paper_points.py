@@ -59,7 +59,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     default = os.environ.get("NAVAPP_DATA", "../shared/data")
     parser.add_argument("folder", nargs="?", default=default)
-    parser.add_argument("--knees", type=int, default=6)
+    parser.add_argument("--knees", type=int, default=20)
     options = parser.parse_args()
     sequences = list(recorded(Path(options.folder)))
     sequences += [simulated(_FIRST_SEED + k) for k in range(options.knees)]
