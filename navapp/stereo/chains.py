@@ -126,7 +126,8 @@ def match_baseline(
     """As the paper does: gradient magnitudes, winner takes all, Gaussian filter.
 
     Filled, it is the paper's proposal (section 3.2): occlusions by weighted least squares before
-    the filter. Without, it is its state of the art (section 3.1). Arguments as for `match_scene`.
+    the filter. Matches that hang over an edge are withdrawn as in the other chains, which the paper
+    does not do. Without, it is its state of the art (section 3.1). Arguments as for `match_scene`.
     """
     watch = Stopwatch()
     pair = clip_box(pair)

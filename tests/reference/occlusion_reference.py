@@ -50,8 +50,8 @@ def classes_reference(
             elif not is_matched[y, x]:
                 is_seen = (np.abs(points_at - x) <= 0.6).any()
                 classes[y, x] = Origin.MISMATCH_FILLED if is_seen else Origin.FILLED_INTERIOR
-        like_behind = _looks_like_behind(disparity[y], classes[y] == 0, picture[y].astype(int))
-        classes[y, like_behind] = Origin.FILLED_INTERIOR
+        overhang = _find_overhang(disparity[y], classes[y] == 0, picture[y].astype(int))
+        classes[y, overhang] = Origin.FILLED_INTERIOR
         for x in np.flatnonzero(classes[y] == Origin.FILLED_INTERIOR):
             stands = np.flatnonzero(classes[y] == 0)
             before, after = stands[stands < x], stands[stands > x]
@@ -63,19 +63,23 @@ def classes_reference(
     return classes
 
 
-def _looks_like_behind(
+def _find_overhang(
     disparity: NDArray[np.float32], stands: NDArray[np.bool_], grey: NDArray[np.int64]
 ) -> list[int]:
     """Columns of matches at left edges that look like what is left of the edge."""
     found: list[int] = []
     before = None
     for edge in np.flatnonzero(stands):
-        if edge in found or not 6 <= edge <= len(stands) - 9:
+        if edge in found:
             continue
         is_edge = before is not None and disparity[edge] - disparity[before] >= 2.0
         before = edge
-        for x in range(edge, edge + 3 if is_edge else edge):
-            sides = grey[edge - 6 : edge], grey[edge + 3 : edge + 9]
+        if not is_edge or edge < 6 or edge + 9 > len(stands):
+            continue
+        if not stands[edge + 3] or abs(disparity[edge + 3] - disparity[edge]) >= 2.0:
+            continue
+        sides = grey[edge - 6 : edge], grey[edge + 3 : edge + 9]
+        for x in range(edge, edge + 3):
             to_behind, to_nearer = (abs(side - grey[x]).min() for side in sides)
             if not stands[x] or to_behind + 10 >= to_nearer:
                 break

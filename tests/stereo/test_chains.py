@@ -180,7 +180,8 @@ def test_matches_keep_their_value_through_the_fill(band_px: tuple[float, float])
     # None is invented; a few are withdrawn: in the strip, and at the near rectangle's left edge.
     assert (before.origin[stands] == Origin.MATCHED).all()
     withdrawn = (before.origin == Origin.MATCHED) & ~stands
-    assert withdrawn.mean() < 0.01
+    assert 0 < withdrawn.mean() < 0.01
+    assert (after.origin[withdrawn] == Origin.FILLED_INTERIOR).any()
     near_edge = part(edge_distance_px(), AT_LEFT_EDGE) < 16.0
     assert (near_edge | part(X - WALL < 9.0, AT_LEFT_EDGE))[withdrawn].all()
     # What is filled never claims to be measured well.

@@ -110,6 +110,14 @@ def test_matches_stay_and_gaps_become_guesses_with_their_class(
     assert np.array_equal(np.isnan(found.disparity_px), found.origin == Origin.UNKNOWN)
 
 
+@EVERY_RESOLUTION
+def test_matches_that_hang_over_the_edge_are_withdrawn(band_px: tuple[float, float]) -> None:
+    coarse = match_coarsely(scene(INSIDE), band_px)
+    filled = fill_surroundings(coarse)
+    before = coarse.matched.found.left.is_matched
+    assert (filled.origin[before] == Origin.FILLED_INTERIOR).any()
+
+
 @WALL_ALONE
 def test_what_stands_before_the_band_is_found(band_px: tuple[float, float]) -> None:
     near = part(IS_NEAR, INSIDE) & is_clear(12.0)

@@ -2,7 +2,9 @@
 
 In the left view a border occlusion is the strip that the right camera does not see; an interior
 occlusion stands left of something nearer, and no right pixel maps to it; the rest of the unmatched
-pixels are mismatches. The class decides from which side a pixel may be filled.
+pixels are mismatches. The class decides from which side a pixel may be filled. Matches at the left
+edge of something nearer that look like what is behind it are interior occlusions, too: a matching
+window hangs over the edge.
 """
 
 import numpy as np
@@ -32,7 +34,7 @@ def classify(
         right_px: (h, W) float32 disparity of the right view in the same rows, NaN where unknown.
         right_x0: column of its first pixel in the rectified right picture.
         picture_width: of the rectified pictures.
-        picture: (h, w) rectified grey left picture over the map.
+        picture: (h, w) rectified grey left picture over the map: tells what looks alike.
 
     Returns:
         (h, w) 0 where the match stands and outside the picture, else the `Origin` that a filled
@@ -41,7 +43,7 @@ def classify(
     Raises:
         ValueError: another number of rows, or a picture of another size.
 
-    Source: the paper, section 3.2 (border and non-border occlusions).
+    Source: the paper, section 3.2 (border and non-border occlusions); withdrawn matches are ours.
     """
     shape = left.disparity_px.shape
     if right_px.shape[0] != shape[0]:

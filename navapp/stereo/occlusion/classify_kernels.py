@@ -19,9 +19,14 @@ _RUN_PX = 6
 _STRIP_SLACK_PX = 8.0
 # The strip's end is agreed over this many rows above and below.
 _STRIP_ROWS = 4
-# At the left edge of something nearer, by so much, so many pixels may show what is behind it. So
-# many on either side of them tell what each looks like; so many grey levels differ clearly.
-_JUMP_PX, _OVER_PX, _LOOK_PX, _CLEARLY_GREY = 2.0, 3, 6, 10
+# At a left edge the disparity grows by this much from one match to the next. Chosen.
+_JUMP_PX = 2.0
+# A matching window hangs over an edge by up to so many pixels. Chosen.
+_OVERHANG_PX = 3
+# So many pixels on either side of these tell what each looks like. Chosen.
+_SAMPLE_PX = 6
+# By so much a pixel is more like one of them. Chosen on noise: few matches of it are withdrawn.
+_LEAST_GREY_DIFFERENCE = 10
 
 
 @njit(cache=True, nogil=True)
@@ -119,32 +124,42 @@ def class_rows(
                 row[x] = 0
             else:
                 row[x] = _MISMATCH if seen[y, x] else _INTERIOR
-        _withdraw_background(disparity[y], picture[y], row)
+        _withdraw_overhang(disparity[y], picture[y], row)
         _keep_possible(disparity[y], row)
 
 
 @njit(cache=True, nogil=True)
-def _withdraw_background(
+def _withdraw_overhang(
     disparity: NDArray[np.float32], grey: NDArray[np.uint8], row: NDArray[np.uint8]
 ) -> None:
     """Matches at left edges that look like what is behind the edge become interior occlusions.
 
     A matching window hangs over the edge and gives what is behind it the nearer one's disparity.
+    Too near the map's sides, or beside something narrower than the overhang, nothing is withdrawn.
     """
     before = -1
-    for x in range(_LOOK_PX, len(row) - _OVER_PX - _LOOK_PX + 1):
+    for x in range(len(row)):
         if row[x] != 0:
             continue
         is_edge = before >= 0 and disparity[x] - disparity[before] >= _JUMP_PX
-        before, u = x, x
-        while is_edge and u < x + _OVER_PX and row[u] == 0:
-            to_behind = to_nearer = 255
-            for k in range(_LOOK_PX):
-                to_behind = min(to_behind, abs(np.int64(grey[x - 1 - k]) - grey[u]))
-                to_nearer = min(to_nearer, abs(np.int64(grey[x + _OVER_PX + k]) - grey[u]))
-            is_edge = to_behind + _CLEARLY_GREY < to_nearer
-            row[u] = _INTERIOR if is_edge else row[u]
-            u += 1
+        before, inner = x, x + _OVERHANG_PX
+        if not is_edge or x < _SAMPLE_PX or inner + _SAMPLE_PX > len(row):
+            continue
+        if row[inner] == 0 and abs(disparity[inner] - disparity[x]) < _JUMP_PX:
+            for u in range(x, inner):
+                if row[u] != 0 or not _looks_like_behind(grey, x, u):
+                    break
+                row[u] = _INTERIOR
+
+
+@njit(cache=True, nogil=True)
+def _looks_like_behind(grey: NDArray[np.uint8], edge: int, u: int) -> bool:
+    """Whether pixel u right of an edge is like one left of it, not like one beyond the overhang."""
+    to_behind = to_nearer = 255
+    for k in range(_SAMPLE_PX):
+        to_behind = min(to_behind, abs(np.int64(grey[u]) - grey[edge - 1 - k]))
+        to_nearer = min(to_nearer, abs(np.int64(grey[u]) - grey[edge + _OVERHANG_PX + k]))
+    return bool(to_behind + _LEAST_GREY_DIFFERENCE < to_nearer)
 
 
 @njit(cache=True, nogil=True)

@@ -225,6 +225,34 @@ def test_matches_that_look_like_what_is_behind_the_edge_are_interior_occlusions(
     assert not classify(found, nobody, 60, 200, picture)[:, 30:].any()
 
 
+def test_something_narrower_than_the_overhang_keeps_its_matches() -> None:
+    found, picture = edge_that_hangs_over()
+    nobody = np.full((5, 60), np.nan, dtype=np.float32)
+    # Nothing is matched beyond it, or something farther is.
+    found.origin[:, 33] = Origin.UNKNOWN
+    assert not classify(found, nobody, 60, 200, picture)[:, 30:33].any()
+    found, picture = edge_that_hangs_over()
+    found.disparity_px[:, 33:] = 20.0
+    assert not classify(found, nobody, 60, 200, picture)[:, 30:].any()
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_edges_near_the_sides_of_a_map_are_those_of_the_reference(seed: int) -> None:
+    """Jumps and grey levels that just suffice, in maps of a few columns."""
+    rng = np.random.default_rng(seed)
+    nobody = np.full((40, 26), np.nan, dtype=np.float32)
+    for width in range(1, 26):
+        behind, edge = rng.integers(0, width + 1, (2, 40, 1))
+        columns = np.arange(width)
+        left = np.where(columns < edge, 20.0, 20.0 + rng.choice([1.9375, 2.0, 9.0], (40, 1)))
+        left[rng.random(left.shape) < 0.1] = np.nan
+        picture = np.where(columns < behind, 60, 60 + rng.choice([10, 11, 90], (40, 1)))
+        found = as_map(left, x=60)
+        classes = classify(found, nobody[:, :width], 60, 200, picture.astype(np.uint8))
+        given = found.disparity_px, found.is_matched, 60, nobody[:, :width].astype(float), 60
+        np.testing.assert_array_equal(classes, classes_reference(*given, picture.astype(np.uint8)))
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_classes_are_those_of_the_reference(seed: int) -> None:
     rng = np.random.default_rng(seed)
