@@ -17,16 +17,16 @@ class SlowFill:
         self.settings, self.radius = settings, radius
 
     def told(self) -> NDArray:
-        """(h, w) the disparity, and what is told where it is classified; NaN: nothing may speak."""
+        """(h, w) the disparity, and what is told where it is classified; NaN: no match fills it."""
         told = np.where(self.classes == 0, self.disparity, np.nan)
         for y, row in enumerate(told):
             neighbours = self._neighbours(y)
             begin = 0
-            for x, who in enumerate(neighbours):
-                if self._goes_on(y, begin, x + 1) and neighbours[x + 1] == who:
+            for x, own in enumerate(neighbours):
+                if self._goes_on(y, begin, x + 1) and neighbours[x + 1] == own:
                     continue
-                if who:
-                    row[begin : x + 1] = self._fill_piece(y, np.arange(begin, x + 1), who)
+                if own:
+                    row[begin : x + 1] = self._fill_piece(y, np.arange(begin, x + 1), own)
                 begin = x + 1
         return told
 
@@ -36,47 +36,47 @@ class SlowFill:
         return x < len(row) and x - begin < 16 and abs(row[x] - row[begin]) <= 30
 
     def _neighbours(self, y: int) -> list[list[int]]:
-        """Columns of the nearest support on the sides that may speak, for every pixel of a row."""
+        """Columns of the nearest matches from which each pixel of a row may be filled."""
         columns, max_gap = np.flatnonzero(self.support[y]), self.settings.max_gap_px
         found = []
         for x, label in enumerate(self.classes[y]):
-            who = []
+            own = []
             if label in (Origin.FILLED_INTERIOR, Origin.MISMATCH_FILLED):
-                who += list(columns[columns < x][-1:])
+                own += list(columns[columns < x][-1:])
             if label in (Origin.FILLED_BORDER, Origin.MISMATCH_FILLED):
-                who += list(columns[columns > x][:1])
-            found.append([int(u) for u in who if max_gap is None or abs(u - x) <= max_gap])
+                own += list(columns[columns > x][:1])
+            found.append([int(u) for u in own if max_gap is None or abs(u - x) <= max_gap])
         return found
 
-    def _fill_piece(self, y: int, columns: NDArray, who: list[int]) -> NDArray:
+    def _fill_piece(self, y: int, columns: NDArray, neighbours: list[int]) -> NDArray:
         middle, grey = columns.mean(), self.picture[y, columns].mean()
-        layer, distance = min((self.disparity[y, u], abs(u - middle)) for u in who)
+        layer, distance = min((self.disparity[y, u], abs(u - middle)) for u in neighbours)
         equations = []
-        for v, u in self._asked(y, middle, who):
+        for v, u in self._find_support(y, middle, neighbours):
             dx, dy, d = u - middle, v - y, float(self.disparity[v, u] - layer)
             if abs(d) < self.settings.layer_px + self.settings.layer_growth * abs(dx):
-                far = (math.hypot(dx, dy) - distance) / (0.4 * self.radius)
-                far += abs(self.picture[v, u] - grey) / self.settings.grey_scale
-                weight = (0.05 + np.nan_to_num(self.confidence[v, u])) * math.exp(-far)
+                exponent = (math.hypot(dx, dy) - distance) / (0.4 * self.radius)
+                exponent += abs(self.picture[v, u] - grey) / self.settings.grey_scale
+                weight = (0.05 + np.nan_to_num(self.confidence[v, u])) * math.exp(-exponent)
                 equations.append((weight, dx, dy, d))
         value, slope = plane_at_origin(np.array(equations), self.settings.slope_penalty_px2)
         d = np.array(equations)[:, 3]
         return layer + np.clip(value + slope * (columns - middle), d.min() - 1.0, d.max() + 1.0)
 
-    def _asked(self, y: int, middle: float, who: list[int]) -> list[tuple[int, int]]:
-        """Every third support on both sides of who speaks, up to the piece's middle inwards."""
+    def _find_support(self, y: int, middle: float, neighbours: list[int]) -> list[tuple[int, int]]:
+        """Rows and columns of every third match around the neighbours, inwards up to the middle."""
         height, width = self.support.shape
         up = max(round(0.3 * self.radius) // 3, 1) * 3
-        asked = []
-        for first in who:
+        found = []
+        for first in neighbours:
             outwards = 1 if first > middle else -1
             inwards = min(int(abs(first - middle) - 0.5), self.radius) // 3 * 3
             for v in range(y - up, y + up + 1, 3):
                 for k in range(-inwards, self.radius + 1, 3):
                     u = first + outwards * k
                     if 0 <= v < height and 0 <= u < width and self.support[v, u]:
-                        asked.append((v, u))
-        return asked
+                        found.append((v, u))
+        return found
 
 
 def plane_at_origin(equations: NDArray, slope_penalty: float) -> tuple[float, float]:

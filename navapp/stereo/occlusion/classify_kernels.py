@@ -19,13 +19,13 @@ _RUN_PX = 6
 _STRIP_SLACK_PX = 8.0
 # The strip's end is agreed over this many rows above and below.
 _STRIP_ROWS = 4
-# At a left edge the disparity grows by this much from one match to the next. Chosen.
+# All chosen. At a left edge the disparity grows by this much from one match to the next.
 _JUMP_PX = 2.0
-# A matching window hangs over an edge by up to so many pixels. Chosen.
+# A matching window hangs over an edge by up to so many pixels.
 _OVERHANG_PX = 3
-# So many pixels on either side of these tell what each looks like. Chosen.
+# So many pixels before the edge, and as many beyond the overhang, show what either side looks like.
 _SAMPLE_PX = 6
-# By so much a pixel is more like one of them. Chosen on noise: few matches of it are withdrawn.
+# A pixel belongs behind the edge when it is more like that side by more than so many grey levels.
 _LEAST_GREY_DIFFERENCE = 10
 
 
@@ -134,8 +134,9 @@ def _withdraw_overhang(
 ) -> None:
     """Matches at left edges that look like what is behind the edge become interior occlusions.
 
-    A matching window hangs over the edge and gives what is behind it the nearer one's disparity.
-    Too near the map's sides, or beside something narrower than the overhang, nothing is withdrawn.
+    A matching window hangs over the edge, and gives what is behind it the disparity of what is
+    nearer. Nothing is withdrawn too near the map's sides, or where what is nearer is narrower than
+    the overhang.
     """
     before = -1
     for x in range(len(row)):
