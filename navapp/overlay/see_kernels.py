@@ -52,25 +52,25 @@ def look_up_depth(
         is_guess: (h, w) in place, 1 where nothing is matched.
         in_front: (h, w) in place, 255 where it is marked.
     """
-    scale = np.float32(focal_baseline)
+    scale, width = np.float32(focal_baseline), depth_mm.shape[1]
     for j in range(depth_mm.shape[0]):
-        for i in range(depth_mm.shape[1]):
-            depth_mm[j, i], is_guess[j, i], in_front[j, i] = np.nan, 1, 0
-            at = j + first[1], i + first[0]
-            u, v = int(columns[at]), int(rows[at])
+        across = columns[j + first[1], first[0] : first[0] + width]
+        down = rows[j + first[1], first[0] : first[0] + width]
+        share = depth_share[j + first[1], first[0] : first[0] + width]
+        for i in range(width):
+            u, v = int(across[i]), int(down[i])
             x, y = u - corner[0], v - corner[1]
+            mark, depth, guess = 0, np.float32(np.nan), 1
             # Beside the marks nothing is known.
-            if x < 0 or y < 0 or x >= is_in_front.shape[1] or y >= is_in_front.shape[0]:
-                continue
-            if is_in_front[y, x]:
-                in_front[j, i] = 255
-            disparity, is_matched = look_up(u, v, finer)
-            if not is_matched:
-                disparity, is_matched = look_up(u, v, around)
-            if is_matched:
-                is_guess[j, i] = 0
-            if disparity > 0.0:
-                depth_mm[j, i] = scale / disparity * depth_share[at]
+            if 0 <= x < is_in_front.shape[1] and 0 <= y < is_in_front.shape[0]:
+                mark = 255 if is_in_front[y, x] else 0
+                disparity, is_matched = look_up(u, v, finer)
+                if not is_matched:
+                    disparity, is_matched = look_up(u, v, around)
+                guess = 0 if is_matched else 1
+                if disparity > 0.0:
+                    depth = scale / disparity * share[i]
+            depth_mm[j, i], is_guess[j, i], in_front[j, i] = depth, guess, mark
 
 
 @njit(cache=True, nogil=True)

@@ -1,8 +1,11 @@
 """Areas: surfaces tinted, and their outlines."""
 
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
+from navapp.geometry.bands import run_both
 from navapp.geometry.box import Box
 from navapp.geometry.zbuffer import RenderedView
 from navapp.overlay.blend_kernels import blend_outline, lay_over, tint_faces
@@ -24,15 +27,21 @@ def draw_bone(image: Image, scene: Scene, tints: list[Tint], colour: Colour | No
     view = scene.view
     if view.box.is_empty:
         return
-    if tints:
-        n_faces = len(tints[0].share_of_face)
-        share, colours = np.zeros(n_faces, np.float32), np.zeros((n_faces, 3), np.float32)
-        for tint in tints:
-            lay_over(share, colours, tint.share_of_face, tint.colour_of_face)
-        weight = scene.weight_over(view.box)
-        tint_faces(image[view.box.slices], view.face_index, share, colours, weight)
+    tint, soften = partial(_tint_bone, image, scene, tints), partial(soften_mask, scene, view)
+    _, soft = run_both(tint, soften)
     if colour is not None:
-        draw_outline(image, scene, view, scene.weight_over(outline_box(view, scene)), colour)
+        draw_outline(image, scene, view, soft, scene.weight_over(outline_box(view, scene)), colour)
+
+
+def _tint_bone(image: Image, scene: Scene, tints: list[Tint]) -> None:
+    if not tints:
+        return
+    view, n_faces = scene.view, len(tints[0].share_of_face)
+    share, colours = np.zeros(n_faces, np.float32), np.zeros((n_faces, 3), np.float32)
+    for tint in tints:
+        lay_over(share, colours, tint.share_of_face, tint.colour_of_face)
+    weight = scene.weight_over(view.box)
+    tint_faces(image[view.box.slices], view.face_index, share, colours, weight)
 
 
 def draw_body(image: Image, scene: Scene, view: RenderedView, body: Body) -> None:
@@ -44,11 +53,16 @@ def draw_body(image: Image, scene: Scene, view: RenderedView, body: Body) -> Non
     inner = view.box.relative_to(box).slices
     colour = one_colour(body.colour)
     tint_faces(image[view.box.slices], view.face_index, body.share_of_face, colour, weight[inner])
-    draw_outline(image, scene, view, weight, body.colour)
+    draw_outline(image, scene, view, soften_mask(scene, view), weight, body.colour)
 
 
 def draw_outline(
-    image: Image, scene: Scene, view: RenderedView, weight: FloatMap, colour: Colour
+    image: Image,
+    scene: Scene,
+    view: RenderedView,
+    soft: NDArray[np.uint8],
+    weight: FloatMap,
+    colour: Colour,
 ) -> None:
     """The edge of a rendered mesh, two pixels wide; in stripes where the weight is that of beneath.
 
@@ -56,9 +70,18 @@ def draw_outline(
         image: in place.
         scene: for the size of the picture.
         view: of the mesh.
+        soft: (h, w) over `outline_box`, of `soften_mask`.
         weight: (h, w) over `outline_box`.
         colour: of the line.
     """
+    box = outline_box(view, scene)
+    blend_outline(
+        image[box.slices], soft, weight, (box.x, box.y), _STRIPE_PX, BENEATH_WEIGHT, colour
+    )
+
+
+def soften_mask(scene: Scene, view: RenderedView) -> NDArray[np.uint8]:
+    """(h, w) over `outline_box`: where a mesh is seen, with a smooth edge, 0 to 255."""
     import cv2
 
     box = outline_box(view, scene)
@@ -66,10 +89,7 @@ def draw_outline(
     inner = mask[view.box.relative_to(box).slices]
     np.multiply(view.mask.view(np.uint8), np.uint8(255), out=inner)
     window = _OUTLINE_WINDOW_PX, _OUTLINE_WINDOW_PX
-    soft = np.asarray(cv2.GaussianBlur(mask, window, _OUTLINE_SIGMA_PX), dtype=np.uint8)
-    blend_outline(
-        image[box.slices], soft, weight, (box.x, box.y), _STRIPE_PX, BENEATH_WEIGHT, colour
-    )
+    return np.asarray(cv2.GaussianBlur(mask, window, _OUTLINE_SIGMA_PX), dtype=np.uint8)
 
 
 def outline_box(view: RenderedView, scene: Scene) -> Box:

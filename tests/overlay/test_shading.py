@@ -7,7 +7,7 @@ from navapp.geometry.zbuffer import render
 from navapp.overlay.colours import one_colour
 from navapp.overlay.drawing import Body, Tint
 from navapp.overlay.scene import BENEATH_WEIGHT
-from navapp.overlay.shading import draw_body, draw_bone, draw_outline, outline_box
+from navapp.overlay.shading import draw_body, draw_bone, draw_outline, outline_box, soften_mask
 from tests.geometry.shapes import sphere
 from tests.overlay.scenes import CAMERA, MESH, POSE, black, grown, is_colour, scene, seen
 from tests.views import find_silhouette
@@ -27,7 +27,7 @@ def silhouette() -> np.ndarray:
 
 def test_the_outline_lies_at_the_edge_of_the_silhouette() -> None:
     image = black()
-    draw_outline(image, scene(), VIEW, weight(1.0), COLOUR)
+    draw_outline(image, scene(), VIEW, soften_mask(scene(), VIEW), weight(1.0), COLOUR)
     edge = silhouette()
     # Less than the colour itself only at corners.
     assert (image[edge][:, 1] > 0.75 * COLOUR[1]).mean() > 0.99
@@ -42,7 +42,7 @@ def test_the_outline_lies_at_the_edge_of_the_silhouette() -> None:
 
 def test_beneath_something_the_outline_is_in_stripes_that_are_seen() -> None:
     image = black()
-    draw_outline(image, scene(), VIEW, weight(BENEATH_WEIGHT), COLOUR)
+    draw_outline(image, scene(), VIEW, soften_mask(scene(), VIEW), weight(BENEATH_WEIGHT), COLOUR)
     on_edge = image[silhouette()].astype(int)
     is_full = (np.abs(on_edge - COLOUR) <= 12).all(axis=1)
     assert 0.35 < is_full.mean() < 0.65
@@ -53,7 +53,7 @@ def test_beneath_something_the_outline_is_in_stripes_that_are_seen() -> None:
 
 def test_a_hidden_outline_is_not_drawn() -> None:
     image = black()
-    draw_outline(image, scene(), VIEW, weight(0.0), COLOUR)
+    draw_outline(image, scene(), VIEW, soften_mask(scene(), VIEW), weight(0.0), COLOUR)
     assert not image.any()
 
 

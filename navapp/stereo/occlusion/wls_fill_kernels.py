@@ -64,6 +64,7 @@ def fill_rows(scene: Scene, rules: Rules, first: int, step: int, told: NDArray[n
     """
     height, width = told.shape
     on_left, on_right = np.empty(width, np.int64), np.empty(width, np.int64)
+    sums = np.empty(9)
     for y in range(first, height, step):
         _find_neighbours(scene.is_support[y], scene.classes[y], rules.max_gap_px, on_left, on_right)
         begin = 0
@@ -72,7 +73,7 @@ def fill_rows(scene: Scene, rules: Rules, first: int, step: int, told: NDArray[n
             if on_left[begin] >= 0 or on_right[begin] >= 0:
                 end = _find_end(scene.picture[y], begin, on_left, on_right)
                 neighbours = on_left[begin], on_right[begin]
-                _fill_piece(scene, rules, y, neighbours, begin, told[y, begin:end])
+                _fill_piece(scene, rules, y, neighbours, begin, sums, told[y, begin:end])
             begin = end
 
 
@@ -124,6 +125,7 @@ def _fill_piece(
     y: int,
     neighbours: tuple[int, int],
     begin: int,
+    sums: NDArray[np.float64],
     filled: NDArray[np.float32],
 ) -> None:
     """Fill a piece, from column `begin` on, with one plane through the farther match's layer.
@@ -137,7 +139,8 @@ def _fill_piece(
         if u >= 0 and scene.disparity[y, u] < disparity_px:
             disparity_px, neighbour_px = scene.disparity[y, u], abs(u - middle)
     piece = Piece(y, middle, grey, disparity_px, neighbour_px)
-    sums, low, high = np.zeros(9), np.inf, -np.inf
+    low, high = np.inf, -np.inf
+    sums[:] = 0.0
     for row in range(-rules.n_rows, rules.n_rows + 1):
         v = y + row * STRIDE_PX
         if 0 <= v < len(scene.disparity):
@@ -145,13 +148,14 @@ def _fill_piece(
                 if u >= 0:
                     ends = _add_support(scene, rules, piece, v, u, outwards, sums)
                     low, high = min(low, ends[0]), max(high, ends[1])
-    value, slope = _fit_plane(sums / sums[0], rules.slope_penalty_px2)
+    sums /= sums[0]
+    value, slope = _fit_plane(sums, rules.slope_penalty_px2)
     for k in range(len(filled)):
         d = value + slope * (begin + k - middle)
         filled[k] = disparity_px + min(max(d, low - _BEYOND_PX), high + _BEYOND_PX)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, inline="always")
 def _add_support(
     scene: Scene,
     rules: Rules,
