@@ -9,7 +9,6 @@ on its own (`each`), or as it is (`forward`). A frame is exempt when the bound a
 exceeds 0.5 mm: where the tibia rests next to that pose, behind the femur at its true pose, as
 judged there; `--frames` lists them. Hip and ankle centre of the phantoms' plans are made up: they
 say where the axes are, for estimate and truth alike. With --knees, simulated sessions with seeds
-from tests.pictures import Pictures
 from SEED on are run instead: the tibia is looked for once the femur is accepted, and followed in
 its turns of 16 frames.
 """
