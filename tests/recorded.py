@@ -1,4 +1,4 @@
-"""Frames of a recorded sequence, each with its true pose."""
+"""Frames of a recorded sequence, and their true poses."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -22,11 +22,16 @@ class RecordedFrame(NamedTuple):
 
 def read_frames(sequence: Path, bone: str = "femur") -> Iterator[RecordedFrame]:
     """All frames of a folder of which its `truth.json` speaks, in the order of their numbers."""
-    truth = read_truth(sequence / "truth.json")
-    assert isinstance(truth, PoseTruth)
-    for number, pose in sorted(truth.poses[bone].items()):
+    for number, pose in sorted(read_true_poses(sequence, bone).items()):
         left, right = (read_picture(sequence, eye, number) for eye in ("left", "right"))
         yield RecordedFrame(number, left, right, pose)
+
+
+def read_true_poses(sequence: Path, bone: str = "femur") -> dict[int, RigidTransform]:
+    """Left camera from bone by the number of its frame, of a folder's `truth.json`."""
+    truth = read_truth(sequence / "truth.json")
+    assert isinstance(truth, PoseTruth)
+    return dict(truth.poses[bone])
 
 
 def read_picture(sequence: Path, name: str, number: int) -> Image:

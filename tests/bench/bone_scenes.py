@@ -1,6 +1,5 @@
 """Pairs that show a bone whose pose and visible pixels are known: recorded and simulated."""
 
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,6 +16,7 @@ from sim_devices.scenario import Scenario
 from sim_devices.sensor import SensorModel
 from sim_devices.world import World
 from tests.knees import femur_of
+from tests.recorded import read_true_poses
 from tests.views import project_box
 
 SEQUENCES = ("registration", "patient", "instrument")
@@ -78,13 +78,11 @@ def simulated_sequence(name: str) -> Sequence:
 
 
 def _recorded(folder: Path, mesh: TriangleMesh, rig: StereoRig) -> Iterator[Scene]:
-    for entry in json.loads((folder / "truth.json").read_text(encoding="utf-8"))["frames"]:
-        number = f"{entry['index']:04d}"
+    for number, true in read_true_poses(folder).items():
         left, right, mask = (
-            cv2.imread(str(next(folder.glob(f"{name}_{number}.*"))), cv2.IMREAD_GRAYSCALE)
+            cv2.imread(str(next(folder.glob(f"{name}_{number:04d}.*"))), cv2.IMREAD_GRAYSCALE)
             for name in ("left", "right", "bone_mask_left")
         )
-        true = RigidTransform("left", "femur", entry["T_leftcam_from_ct"]["femur"])
         yield _scene(Rectifier(rig), (left, right, mask), true, mesh)
 
 

@@ -37,6 +37,7 @@ from navapp.geometry.rig_files import read_rig
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.triangulation import triangulate_mm
 from tests.calibration.marks import BOARD, HEIGHT, WIDTH, drawn_pairs, drawn_rig
+from tests.recorded import read_true_poses
 
 _CHESSBOARD = {"type": "chessboard", "squares_x": 10, "squares_y": 7, "square_mm": 1.0}
 _CRITERIA = (cv2.TERM_CRITERIA_COUNT + cv2.TERM_CRITERIA_EPS, 100, 1e-9)
@@ -216,10 +217,8 @@ def off_mm(solved: StereoRig, true: StereoRig, points_mm: FloatArray) -> FloatAr
 def bone(folder: Path) -> FloatArray:
     """(n, 3) visible points of the femur in all registration frames, left camera."""
     mesh: TriangleMesh = read_ply(folder / "femur.ply")[0]
-    frames = json.loads((folder / "registration" / "truth.json").read_text())["frames"]
     points = []
-    for frame in frames:
-        pose = RigidTransform("left", "femur", np.array(frame["T_leftcam_from_ct"]["femur"]))
+    for pose in read_true_poses(folder / "registration").values():
         seen, normals = pose.apply(mesh.vertices_mm), pose.rotate(mesh.normals)
         is_facing = (seen * normals).sum(axis=1) < -0.2 * np.linalg.norm(seen, axis=1)
         points.append(seen[is_facing][::7])

@@ -26,6 +26,7 @@ from navapp.evaluation import compute_mean_tre_mm
 from navapp.geometry.ply import read_ply
 from navapp.geometry.transform import RigidTransform, rotation_angle_deg
 from navapp.values import BoneModel
+from tests.recorded import read_true_poses
 
 ORDERS = ("forward", "pingpong", "each")
 # Frames of these are unrelated poses: each is registered on its own.
@@ -112,11 +113,7 @@ def score_frames(
 ) -> Iterator[Scored]:
     """Replayed frames beside the sequence's truth."""
     bone = BoneModel(bone_name, read_ply(surface)[0])
-    content = json.loads((sequence / "truth.json").read_text())
-    truth = {
-        entry["index"]: RigidTransform("left", bone_name, entry["T_leftcam_from_ct"][bone_name])
-        for entry in content["frames"]
-    }
+    truth = read_true_poses(sequence, bone_name)
     for frame in frames:
         tre_mm = turn_deg = float("nan")
         if frame["camera_from_model"] is not None:

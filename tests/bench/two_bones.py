@@ -46,6 +46,7 @@ from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.values import Plan, PoseEstimate
 from tests.bench.recorded_accuracy import find_sequences
 from tests.pictures import Pictures
+from tests.recorded import read_true_poses
 
 _FAR_JOINTS = """\
 [hip]
@@ -264,13 +265,8 @@ def measure_true_limb(
 
 
 def _read_truth(sequence: Path) -> dict[int, dict[str, RigidTransform]]:
-    content = json.loads((sequence / "truth.json").read_text())
-    return {
-        entry["index"]: {
-            name: RigidTransform("left", name, entry["T_leftcam_from_ct"][name]) for name in _BONES
-        }
-        for entry in content["frames"]
-    }
+    poses = {name: read_true_poses(sequence, name) for name in _BONES}
+    return {number: {name: poses[name][number] for name in _BONES} for number in poses["femur"]}
 
 
 def _row(name: str, order: str, turns: list[Turn], frames: list[dict[str, Any]]) -> str:

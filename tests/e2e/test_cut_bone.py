@@ -13,6 +13,7 @@ from navapp.geometry.transform import RigidTransform
 from navapp.preop import read_plan
 from navapp.values import BoneModel
 from tests.few_sides import from_few_sides
+from tests.recorded import read_true_poses
 
 pytestmark = [pytest.mark.data, pytest.mark.slow]
 CUTS = ("femur_distal", "femur_anterior")
@@ -49,13 +50,12 @@ def replay(
 
 def errors_mm(data: Path, plan: Path, sequence: str, frames: list[dict[str, Any]]) -> list[float]:
     """Of the frames that are OK, over the surface that faces the camera."""
-    told = json.loads((data / "cut_a" / sequence / "truth.json").read_text())["frames"]
-    truth = {entry["index"]: entry["T_leftcam_from_ct"]["femur"] for entry in told}
+    truth = read_true_poses(data / "cut_a" / sequence)
     bone: BoneModel = read_plan(plan).bones["femur"]
     return [
         compute_mean_tre_mm(
             RigidTransform("left", "femur", frame["camera_from_model"]),
-            RigidTransform("left", "femur", truth[frame["index"]]),
+            truth[frame["index"]],
             bone,
             np.empty((0, 3)),
         )

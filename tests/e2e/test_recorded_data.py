@@ -15,6 +15,7 @@ from navapp.geometry.ply import read_ply
 from navapp.geometry.transform import RigidTransform
 from navapp.values import BoneModel
 from tests.few_sides import from_few_sides
+from tests.recorded import read_true_poses
 
 # Block matching alone does not reach it: this fails when the fine matching stops working.
 WORST_OK_MM = 0.2
@@ -64,10 +65,7 @@ def test_most_frames_of_a_recorded_operation_get_a_pose(
     ]  # fmt: skip
     assert run(arguments) == 0
     frames = json.loads(poses.read_text(encoding="utf-8"))["frames"]
-    truth = {
-        entry["index"]: RigidTransform("left", "femur", entry["T_leftcam_from_ct"]["femur"])
-        for entry in json.loads((root / "patient" / "truth.json").read_text())["frames"]
-    }
+    truth = read_true_poses(root / "patient")
     bone = BoneModel("femur", read_ply(root / "femur.ply")[0])
     errors_mm = [
         compute_mean_tre_mm(
