@@ -27,10 +27,13 @@ def draw_bone(image: Image, scene: Scene, tints: list[Tint], colour: Colour | No
     view = scene.view
     if view.box.is_empty:
         return
-    tint, soften = partial(_tint_bone, image, scene, tints), partial(soften_mask, scene, view)
-    _, soft = run_both(tint, soften)
-    if colour is not None:
-        draw_outline(image, scene, view, soft, scene.weight_over(outline_box(view, scene)), colour)
+    if colour is None:
+        _tint_bone(image, scene, tints)
+        return
+    box = outline_box(view, scene)
+    # The outline's mask needs nothing of the tints: the helper makes it beside them.
+    _, soft = run_both(partial(_tint_bone, image, scene, tints), partial(soften_mask, view, box))
+    draw_outline(image, box, soft, scene.weight_over(box), colour)
 
 
 def _tint_bone(image: Image, scene: Scene, tints: list[Tint]) -> None:
@@ -53,38 +56,30 @@ def draw_body(image: Image, scene: Scene, view: RenderedView, body: Body) -> Non
     inner = view.box.relative_to(box).slices
     colour = one_colour(body.colour)
     tint_faces(image[view.box.slices], view.face_index, body.share_of_face, colour, weight[inner])
-    draw_outline(image, scene, view, soften_mask(scene, view), weight, body.colour)
+    draw_outline(image, box, soften_mask(view, box), weight, body.colour)
 
 
 def draw_outline(
-    image: Image,
-    scene: Scene,
-    view: RenderedView,
-    soft: NDArray[np.uint8],
-    weight: FloatMap,
-    colour: Colour,
+    image: Image, box: Box, soft: NDArray[np.uint8], weight: FloatMap, colour: Colour
 ) -> None:
     """The edge of a rendered mesh, two pixels wide; in stripes where the weight is that of beneath.
 
     Args:
         image: in place.
-        scene: for the size of the picture.
-        view: of the mesh.
-        soft: (h, w) over `outline_box`, of `soften_mask`.
-        weight: (h, w) over `outline_box`.
+        box: of the mesh, as of `outline_box`.
+        soft: (h, w) over the box, 0 to 255, where the mesh is seen, as of `soften_mask`.
+        weight: (h, w) over the box.
         colour: of the line.
     """
-    box = outline_box(view, scene)
     blend_outline(
         image[box.slices], soft, weight, (box.x, box.y), _STRIPE_PX, BENEATH_WEIGHT, colour
     )
 
 
-def soften_mask(scene: Scene, view: RenderedView) -> NDArray[np.uint8]:
-    """(h, w) over `outline_box`: where a mesh is seen, with a smooth edge, 0 to 255."""
+def soften_mask(view: RenderedView, box: Box) -> NDArray[np.uint8]:
+    """(h, w) over a box around it: where a mesh is seen, with a smooth edge, 0 to 255."""
     import cv2
 
-    box = outline_box(view, scene)
     mask = np.zeros((box.height, box.width), dtype=np.uint8)
     inner = mask[view.box.relative_to(box).slices]
     np.multiply(view.mask.view(np.uint8), np.uint8(255), out=inner)

@@ -143,13 +143,13 @@ def _rectified_places(
     Nearest ones, negative where there is none. The depth in the camera is the rectified depth times
     that share.
     """
-    camera = camera.scale(0.5)
-    rows, columns = np.mgrid[: camera.height, : camera.width]
-    rectified = rectify_rays(camera, geometry, columns.ravel(), rows.ravel())
+    half = half_box(Box(0, 0, camera.width, camera.height))
+    rows, columns = np.mgrid[half.slices]
+    rectified = rectify_rays(camera.scale(0.5), geometry, columns.ravel(), rows.ravel())
     places = np.nan_to_num(
         np.round(geometry.project(rectified)), nan=-1.0, posinf=-1.0, neginf=-1.0
     )
-    shape = camera.height, camera.width
+    shape = half.height, half.width
     # The rays in the camera have the depth 1.
     depth_share = (1.0 / rectified[:, 2]).reshape(shape).astype(np.float32)
     u, v = np.clip(places, -1.0, 32767.0).astype(np.int16).T.reshape(2, *shape)

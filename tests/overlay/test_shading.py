@@ -14,11 +14,11 @@ from tests.views import find_silhouette
 
 COLOUR = (10, 200, 250)
 VIEW = render(MESH, POSE, CAMERA, is_whole=False)
+BOX = outline_box(VIEW, scene())
 
 
 def weight(value: float) -> np.ndarray:
-    box = outline_box(VIEW, scene())
-    return np.full((box.height, box.width), value, dtype=np.float32)
+    return np.full((BOX.height, BOX.width), value, dtype=np.float32)
 
 
 def silhouette() -> np.ndarray:
@@ -27,7 +27,7 @@ def silhouette() -> np.ndarray:
 
 def test_the_outline_lies_at_the_edge_of_the_silhouette() -> None:
     image = black()
-    draw_outline(image, scene(), VIEW, soften_mask(scene(), VIEW), weight(1.0), COLOUR)
+    draw_outline(image, BOX, soften_mask(VIEW, BOX), weight(1.0), COLOUR)
     edge = silhouette()
     # Less than the colour itself only at corners.
     assert (image[edge][:, 1] > 0.75 * COLOUR[1]).mean() > 0.99
@@ -42,7 +42,7 @@ def test_the_outline_lies_at_the_edge_of_the_silhouette() -> None:
 
 def test_beneath_something_the_outline_is_in_stripes_that_are_seen() -> None:
     image = black()
-    draw_outline(image, scene(), VIEW, soften_mask(scene(), VIEW), weight(BENEATH_WEIGHT), COLOUR)
+    draw_outline(image, BOX, soften_mask(VIEW, BOX), weight(BENEATH_WEIGHT), COLOUR)
     on_edge = image[silhouette()].astype(int)
     is_full = (np.abs(on_edge - COLOUR) <= 12).all(axis=1)
     assert 0.35 < is_full.mean() < 0.65
@@ -53,7 +53,7 @@ def test_beneath_something_the_outline_is_in_stripes_that_are_seen() -> None:
 
 def test_a_hidden_outline_is_not_drawn() -> None:
     image = black()
-    draw_outline(image, scene(), VIEW, soften_mask(scene(), VIEW), weight(0.0), COLOUR)
+    draw_outline(image, BOX, soften_mask(VIEW, BOX), weight(0.0), COLOUR)
     assert not image.any()
 
 

@@ -1,12 +1,27 @@
 """What the left camera's picture shows of the measured depth."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from navapp.geometry.box import Box
 from navapp.geometry.halves import double, half_box
+from navapp.geometry.rectification import rectifier_of
 from navapp.geometry.zbuffer import render
+from navapp.overlay import LeftView
 from navapp.values import Foreground, Origin, Surroundings
-from tests.overlay.scenes import CAMERA, HEIGHT, MESH, POSE, WIDTH, Occluder, left_view, measured
+from tests.overlay.scenes import (
+    CAMERA,
+    HEIGHT,
+    MESH,
+    NOTHING,
+    POSE,
+    RIG,
+    WIDTH,
+    Occluder,
+    left_view,
+    measured,
+)
 
 WHOLE = Box(0, 0, WIDTH, HEIGHT)
 
@@ -58,6 +73,21 @@ def test_marks_of_what_stands_in_front_have_a_soft_edge_at_their_place() -> None
     assert row[int(column) + 5 : int(column) + 20].min() > 0.99
     crossing = np.interp(0.5, row[300:350], np.arange(300, 350))
     assert abs(crossing - column) < 1.5
+
+
+def test_the_last_column_of_an_odd_picture_shows_what_is_there() -> None:
+    camera = replace(CAMERA, width=WIDTH + 1, height=HEIGHT + 1)
+    rig = replace(RIG, left=camera, right=camera)
+    geometry = rectifier_of(rig).geometry
+    box = Box(0, 0, geometry.width, geometry.height)
+    disparity_px = np.full((box.height, box.width), 50.0, dtype=np.float32)
+    origin = np.full(disparity_px.shape, Origin.MATCHED, np.uint8)
+    is_in_front = np.broadcast_to(np.arange(box.width) < WIDTH // 2, disparity_px.shape).copy()
+    surroundings = Surroundings(disparity_px, origin, box, False, np.zeros(origin.shape, np.uint8))
+    foreground = Foreground(surroundings, NOTHING, is_in_front)
+    seen = LeftView(rig).see(foreground, Box(0, 0, camera.width, camera.height))
+    assert seen.in_front[:, :20].any()
+    assert not seen.in_front[:, -20:].any()
 
 
 def test_the_left_camera_sees_along_its_own_axes() -> None:

@@ -64,7 +64,7 @@ def fill_rows(scene: Scene, rules: Rules, first: int, step: int, told: NDArray[n
     """
     height, width = told.shape
     on_left, on_right = np.empty(width, np.int64), np.empty(width, np.int64)
-    sums = np.empty(9)
+    sums = np.empty(9)  # room for each piece in turn
     for y in range(first, height, step):
         _find_neighbours(scene.is_support[y], scene.classes[y], rules.max_gap_px, on_left, on_right)
         begin = 0
@@ -130,7 +130,7 @@ def _fill_piece(
 ) -> None:
     """Fill a piece, from column `begin` on, with one plane through the farther match's layer.
 
-    The plane stays within what was measured, and a little beyond.
+    The plane stays within what was measured, and a little beyond. `sums` is room for 9 numbers.
     """
     middle = begin + 0.5 * (len(filled) - 1)
     grey = scene.picture[y, begin : begin + len(filled)].mean()
@@ -155,7 +155,7 @@ def _fill_piece(
         filled[k] = disparity_px + min(max(d, low - _BEYOND_PX), high + _BEYOND_PX)
 
 
-@njit(cache=True, nogil=True, inline="always")
+@njit(cache=True, nogil=True, forceinline=True)
 def _add_support(
     scene: Scene,
     rules: Rules,
