@@ -1,6 +1,6 @@
 """Frames of a recorded sequence, and their true poses."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -27,11 +27,11 @@ def read_frames(sequence: Path, bone: str = "femur") -> Iterator[RecordedFrame]:
         yield RecordedFrame(number, left, right, pose)
 
 
-def read_true_poses(sequence: Path, bone: str = "femur") -> dict[int, RigidTransform]:
-    """Left camera from bone by the number of its frame, of a folder's `truth.json`."""
+def read_true_poses(sequence: Path, bone: str = "femur") -> Mapping[int, RigidTransform]:
+    """Poses (left camera from bone) that a folder's `truth.json` tells, by the frame's number."""
     truth = read_truth(sequence / "truth.json")
     assert isinstance(truth, PoseTruth)
-    return dict(truth.poses[bone])
+    return truth.poses[bone]
 
 
 def read_picture(sequence: Path, name: str, number: int) -> Image:

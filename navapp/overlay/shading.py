@@ -77,7 +77,7 @@ def draw_outline(
 
 
 def soften_mask(view: RenderedView, box: Box) -> NDArray[np.uint8]:
-    """(h, w) over a box around it: where a mesh is seen, with a smooth edge, 0 to 255."""
+    """Where a mesh is seen, with a smooth edge: (h, w) over a box around it, 0 to 255."""
     import cv2
 
     mask = np.zeros((box.height, box.width), dtype=np.uint8)

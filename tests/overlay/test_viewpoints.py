@@ -75,8 +75,10 @@ def test_marks_of_what_stands_in_front_have_a_soft_edge_at_their_place() -> None
     assert abs(crossing - column) < 1.5
 
 
-def test_the_last_column_of_an_odd_picture_shows_what_is_there() -> None:
-    camera = replace(CAMERA, width=WIDTH + 1, height=HEIGHT + 1)
+def test_the_last_row_and_column_of_an_odd_picture_show_what_is_there() -> None:
+    # A lens whose edges stay in the rectified view.
+    distortion = np.array([0.1, 0.0, 0.0, 0.0])
+    camera = replace(CAMERA, distortion=distortion, width=WIDTH + 1, height=HEIGHT + 1)
     rig = replace(RIG, left=camera, right=camera)
     geometry = rectifier_of(rig).geometry
     box = Box(0, 0, geometry.width, geometry.height)
@@ -88,6 +90,7 @@ def test_the_last_column_of_an_odd_picture_shows_what_is_there() -> None:
     seen = LeftView(rig).see(foreground, Box(0, 0, camera.width, camera.height))
     assert seen.in_front[:, :20].any()
     assert not seen.in_front[:, -20:].any()
+    assert np.isfinite(seen.depth_mm).all()
 
 
 def test_the_left_camera_sees_along_its_own_axes() -> None:

@@ -8,21 +8,12 @@ from navapp.geometry.directions import ViewCone
 from navapp.geometry.mesh import TriangleMesh
 from navapp.preop import AspectSettings, build_aspects, read_aspects, write_aspects
 from navapp.preop.aspects_kernels import find_contour_segments, select_spread
-from navapp.preop.bone_edges import find_creases, find_near_ends
+from navapp.preop.bone_edges import find_near_ends
 from navapp.values import AspectGraph, BoneModel
 from tests.bones import femur_model
 from tests.reference.aspects_reference import contour_pieces, farthest_first
 
 RADIUS_MM = 30.0
-
-
-def grid_mesh(x, y, z) -> TriangleMesh:
-    """A mesh over (n, m) places."""
-    n, m = x.shape
-    index = np.arange(n * m).reshape(n, m)
-    a, b, c, d = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
-    faces = np.concatenate([np.stack(t, axis=-1).reshape(-1, 3) for t in ((a, b, c), (a, c, d))])
-    return TriangleMesh(np.stack([x, y, z], axis=-1).reshape(-1, 3), faces.astype(np.int32))
 
 
 def sphere() -> TriangleMesh:
@@ -139,17 +130,6 @@ def test_what_a_stage_has_removed_is_no_edge() -> None:
     cut = replace(bone, is_removed=low)
     graph = build_aspects(cut, (0, -0.6, -0.8), 5.0)
     assert graph.points_mm[:, 2].min() > bone.mesh.vertices_mm[low, 2].max()
-
-
-def test_a_ridge_is_a_crease_along_itself() -> None:
-    y, x = np.meshgrid(np.linspace(-30, 30, 61), np.linspace(-30, 30, 61))
-    mesh = grid_mesh(x, y, -0.9 * np.sqrt(x * x + 1.0) - 0.005 * (x * x + y * y))
-    found = find_creases(mesh, ~find_near_ends(mesh))
-    assert len(found.points_mm) > 30
-    assert np.abs(found.points_mm[:, 0]).max() < 2.5
-    assert np.abs(found.tangents[:, 1]).min() > 0.9
-    flat = grid_mesh(x, y, 0.002 * x * x)
-    assert len(find_creases(flat, ~find_near_ends(flat)).points_mm) == 0
 
 
 def test_views_that_look_the_same_are_one() -> None:

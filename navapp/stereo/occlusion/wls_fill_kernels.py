@@ -148,7 +148,7 @@ def _fill_piece(
                 if u >= 0:
                     ends = _add_support(scene, rules, piece, v, u, outwards, sums)
                     low, high = min(low, ends[0]), max(high, ends[1])
-    sums /= sums[0]
+    sums /= sums[0]  # means from here on
     value, slope = _fit_plane(sums, rules.slope_penalty_px2)
     for k in range(len(filled)):
         d = value + slope * (begin + k - middle)
