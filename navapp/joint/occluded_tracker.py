@@ -102,10 +102,10 @@ class _HiddenBoneJudge(PoseJudge):
         self._whole, self._geometry, self._spread = whole, tracker.meter.geometry, spread
 
     def _settle(
-        self, frame: Frame, fit: Fit, check: PairCheck
+        self, frame: Frame, fit: Fit, check: PairCheck, counts_unmeasured: bool
     ) -> tuple[Fit, RenderedView | None, Agreement | None]:
         """As of any judge, then grown."""
-        fit, view, agreement = super()._settle(frame, fit, check)
+        fit, view, agreement = super()._settle(frame, fit, check, counts_unmeasured)
         estimate = fit.estimate
         if view is not None and agreement is not None and agreement.lies_open:
             whole = self._whole.render(fit.pose, self._geometry, view.box)

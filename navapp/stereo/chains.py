@@ -41,11 +41,7 @@ class StereoAnswer:
 
 
 def match_scene(
-    pair: RectifiedPair,
-    band_px: tuple[float, float],
-    *,
-    fills: bool,
-    max_gap_px: int | None = None,
+    pair: RectifiedPair, band_px: tuple[float, float], *, fills: bool, max_gap_px: int | None = None
 ) -> StereoAnswer:
     """The whole scene, edges and all: every match is kept, refined where the texture allows.
 
@@ -68,11 +64,7 @@ def match_scene(
 
 
 def match_surface(
-    pair: RectifiedPair,
-    band_px: tuple[float, float],
-    *,
-    fills: bool,
-    max_gap_px: int | None = None,
+    pair: RectifiedPair, band_px: tuple[float, float], *, fills: bool, max_gap_px: int | None = None
 ) -> StereoAnswer:
     """Smooth surfaces for measuring: to a part of a pixel, or unknown.
 

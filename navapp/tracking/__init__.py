@@ -6,12 +6,4 @@ from navapp.tracking.motion import TrackState
 from navapp.tracking.settings import Method, Part, TrackerSettings
 from navapp.tracking.tracker import Tracker
 
-__all__ = [
-    "Goal",
-    "Method",
-    "Part",
-    "TrackState",
-    "Tracker",
-    "TrackerSettings",
-    "make_tracker",
-]
+__all__ = ["Goal", "Method", "Part", "TrackState", "Tracker", "TrackerSettings", "make_tracker"]

@@ -78,9 +78,14 @@ class PoseJudge:
         checks = frame.checks or PairChecks(self._meter, frame.pair)
         check = checks.check(fit.measured, fit.pose).result()
         depth_mm = float(fit.pose.apply(model.centre_mm)[2])
-        fit, view, agreement = self._settle(frame, fit, check)
-        evidence = self._evidence_of_pair(check.health, depth_mm)
-        evidence = self._evidence_of_pose(evidence, frame, fit, agreement, goal)
+        of_pair, surface_fit = self._evidence_of_pair(check.health, depth_mm), fit
+        for counts_unmeasured in (False, True):
+            fit, view, agreement = self._settle(frame, surface_fit, check, counts_unmeasured)
+            evidence = self._evidence_of_pose(of_pair, frame, fit, agreement, goal)
+            # Too little may be left of a bone that was worked on: then all of its outline counts.
+            # On a whole one that goes wrong: what is not measured lies under a hand.
+            if model.bone.lid is None or not evidence.seen_excess_mm > 0.0:
+                break
         verdict = decide(evidence)
         has_bound = verdict.predicted_tre_mm is not None
         if has_bound and "judge" in self._settings.leaves_out:
@@ -111,9 +116,9 @@ class PoseJudge:
         return found
 
     def _settle(
-        self, frame: Frame, fit: Fit, check: PairCheck
+        self, frame: Frame, fit: Fit, check: PairCheck, counts_unmeasured: bool
     ) -> tuple[Fit, RenderedView | None, Agreement | None]:
-        """The fit joined with the outline, the model seen there, and how far it agrees.
+        """The fit joined with the outline (`OutlineMeter.join`), the model there, the agreement.
 
         The check has compared a fit on the model where it was matched. Free fits, and those that
         the outline moved, are compared at their pose.
@@ -129,12 +134,14 @@ class PoseJudge:
             if lies_open:
                 # Divided, because what follows multiplies: relief is known as it is, noise as it
                 # is claimed.
-                estimate = fit.estimate.with_relief(1.0 / noise_variance_ratio)
-                fit = replace(fit, estimate=estimate)
+                fit = replace(fit, estimate=fit.estimate.with_relief(1.0 / noise_variance_ratio))
             if "contour" in self._settings.leaves_out:
                 joined = replace(fit, estimate=fit.estimate.scale_noise(noise_variance_ratio))
             else:
-                joined = self.outline.join(frame.pair, fit, check.coarse_px, noise_variance_ratio)
+                joined = self.outline.join(
+                    frame.pair, fit, check.coarse_px, noise_variance_ratio,
+                    counts_unmeasured=counts_unmeasured,
+                )  # fmt: skip
             if fit.pose.mean_motion_mm(joined.pose, model.hull_mm) > _SAME_VIEW_MM:
                 agreement = None
             fit = joined.with_correlated_residuals(noise_variance_ratio)
@@ -186,12 +193,7 @@ class PoseJudge:
         )
 
     def _evidence_of_pose(
-        self,
-        known: Evidence,
-        frame: Frame,
-        fit: Fit,
-        agreement: Agreement | None,
-        goal: Goal,
+        self, known: Evidence, frame: Frame, fit: Fit, agreement: Agreement | None, goal: Goal
     ) -> Evidence:
         """With what a fit and its agreement with the measurement say."""
         model, estimate = self._meter.model, fit.estimate

@@ -66,6 +66,8 @@ class OutlineMeter:
         fit: Fit,
         coarse_px: NDArray[np.float32] | None,
         noise_variance_ratio: float = 1.0,
+        *,
+        counts_unmeasured: bool = False,
     ) -> Fit:
         """A fit to the model's surface, moved to what surface and outline say together.
 
@@ -76,11 +78,17 @@ class OutlineMeter:
             fit: of the bone.
             coarse_px: (h, w) coarse disparity of whatever lies in its box.
             noise_variance_ratio: variance of the surface's noise over the one it claims.
+            counts_unmeasured: the bone need not be measured inside where the coarse map has
+                nothing nearer.
         """
         estimate, view = fit.estimate, fit.measured.rendered
         if view is None or not estimate.has_finite_covariance:
             return fit
-        block = self.block(pair, fit.pose, view, fit.measured.disparity, coarse_px)
+        found = fit.measured.disparity
+        if counts_unmeasured and coarse_px is not None:
+            is_covered = coarse_px > self._geometry.disparity_map_px(view.depth_mm) + _NEARER_PX
+            found = replace(found, origin=np.where(is_covered, found.origin, Origin.MATCHED))
+        block = self.block(pair, fit.pose, view, found, coarse_px)
         centre_mm = fit.pose.apply(self._model.centre_mm)
         seen_mm = fit.measured.cloud.points_mm
         joined = join(

@@ -56,8 +56,12 @@ class SurfaceAlone:
 
     def __init__(self, shift_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> None:
         self._twist = (*shift_mm, 0.0, 0.0, 0.0)
+        self.counted_unmeasured: list[bool] = []  # of each call
 
-    def join(self, pair, fit: Fit, coarse_px, noise_variance_ratio: float) -> Fit:
+    def join(
+        self, pair, fit: Fit, coarse_px, noise_variance_ratio: float, *, counts_unmeasured: bool
+    ) -> Fit:
+        self.counted_unmeasured.append(counts_unmeasured)
         covariance = noise_variance_ratio * fit.estimate.covariance
         pose = fit.pose.move(self._twist, fit.pose.translation_mm)
         estimate = replace(fit.estimate, covariance=covariance, camera_from_bone=pose)

@@ -5,14 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from navapp.registration import estimate_at
+from navapp.geometry.mesh import TriangleMesh
+from navapp.registration import RegistrationModel, estimate_at
 from navapp.tracking import TrackerSettings, TrackState, judging
 from navapp.tracking.agreement import compare
 from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.tracking.checks import PairChecks
 from navapp.tracking.frame import FREE_SETTINGS, Fit, Frame
 from navapp.tracking.judging import PoseJudge
-from navapp.tracking.surface_meter import NEAR_BOX, NEAR_VIEW, WIDE_VIEW
+from navapp.tracking.surface_meter import NEAR_BOX, NEAR_VIEW, WIDE_VIEW, SurfaceMeter
 from navapp.values import Reason, Status, TrackedFrame
 from tests.tracking.judged import SurfaceAlone, Told, altered
 from tests.tracking.rooms import GOAL, Room, room
@@ -158,3 +159,22 @@ def test_out_of_view_there_is_nothing_to_judge() -> None:
     assert answer.verdict.status is Status.LOST
     assert answer.verdict.reasons == (Reason.OUT_OF_VIEW,)
     assert answer.estimate is None
+
+
+@pytest.mark.parametrize(
+    ("is_worked_on", "is_loose", "counted"),
+    [(True, True, [False, True]), (True, False, [False]), (False, True, [False])],
+)
+def test_all_of_the_outline_counts_where_too_little_is_left_of_a_bone_that_was_worked_on(
+    is_worked_on: bool, is_loose: bool, counted: list[bool]
+) -> None:
+    a = room()
+    bone = a.tracker.model.bone
+    lid = TriangleMesh(bone.mesh.vertices_mm[:3], np.array([[0, 1, 2]]))
+    model = RegistrationModel(replace(bone, lid=lid if is_worked_on else None))
+    frame, fit = found_at_the_truth(a)
+    judge = PoseJudge(SurfaceMeter(a.rig, model, a.tracker.meter.depth_mm), TrackerSettings())
+    judge.outline = outline = SurfaceAlone()
+    goal = replace(GOAL, seen_limit_mm=1e-3 if is_loose else 5.0)
+    judge.judge(frame, fit, goal)
+    assert outline.counted_unmeasured == counted

@@ -129,6 +129,22 @@ def test_without_bone_inside_or_with_something_nearer_beside_nothing_counts() ->
     assert len(block_at(fit, far).residual) == len(block_at(fit).residual)
 
 
+def test_edges_without_bone_inside_count_when_asked_for_and_nothing_nearer_is_there() -> None:
+    fit, unmeasured = fit_at(OFF), fit_at(OFF, is_measured=False)
+    view = fit.measured.rendered
+    far = np.full(view.mask.shape, 100.0, dtype=np.float32)
+    on_it = np.where(view.mask, GEOMETRY.disparity_map_px(view.depth_mm), far)
+    hand_px = np.where(view.mask, on_it + np.float32(1.5), far)
+
+    def joined(coarse_px: np.ndarray | None) -> RigidTransform:
+        return meter().join(pair(), unmeasured, coarse_px, counts_unmeasured=True).pose
+
+    everywhere = meter().join(pair(), fit, None).pose.matrix
+    np.testing.assert_array_equal(joined(far).matrix, everywhere)
+    np.testing.assert_array_equal(joined(on_it + np.float32(0.5)).matrix, everywhere)
+    assert joined(hand_px) is joined(None) is unmeasured.pose
+
+
 def test_dark_pictures_leave_the_fit_alone() -> None:
     fit, dark = fit_at(OFF), replace(pair(), left=0 * pair().left, right=0 * pair().right)
     left_alone = meter().join(dark, fit, None)
