@@ -5,12 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.geometry.directions import (
-    ViewCone,
-    make_view_rotation,
-    turn_between,
-    turn_towards,
-)
+from navapp.geometry.directions import ViewCone, make_view_rotation, turn_between, turn_towards
 from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.transform import FloatArray, RigidTransform, rotation_from_vector
 from navapp.registration.model import RegistrationModel

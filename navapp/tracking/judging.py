@@ -78,15 +78,16 @@ class PoseJudge:
         checks = frame.checks or PairChecks(self._meter, frame.pair)
         check = checks.check(fit.measured, fit.pose).result()
         depth_mm = float(fit.pose.apply(model.centre_mm)[2])
-        of_pair, surface_fit = self._evidence_of_pair(check.health, depth_mm), fit
-        for counts_unmeasured in (False, True):
-            fit, view, agreement = self._settle(frame, surface_fit, check, counts_unmeasured)
-            evidence = self._evidence_of_pose(of_pair, frame, fit, agreement, goal)
-            # Too little may be left of a bone that was worked on: then all of its outline counts.
-            # On a whole one that goes wrong: what is not measured lies under a hand.
-            if model.bone.lid is None or not evidence.seen_excess_mm > 0.0:
-                break
+        known = self._evidence_of_pair(check.health, depth_mm)
+        joined, view, evidence = self._join(frame, fit, check, goal, known)
         verdict = decide(evidence)
+        # Too little may be left of a bone that was worked on: then all of its outline counts. On a
+        # whole one that goes wrong: what is not measured lies under a hand.
+        if model.bone.lid is not None and evidence.seen_excess_mm > 0.0:
+            second = self._join(frame, fit, check, goal, known, counts_unmeasured=True)
+            if (again := decide(second[2])).rank < verdict.rank:
+                (joined, view, evidence), verdict = second, again
+        fit = joined
         has_bound = verdict.predicted_tre_mm is not None
         if has_bound and "judge" in self._settings.leaves_out:
             verdict = replace(verdict, status=Status.OK, reasons=())
@@ -101,6 +102,14 @@ class PoseJudge:
         return TrackedFrame(
             model.bone.name, estimate, verdict, frame.watch.timings, rows, foreground
         )
+
+    def _join(
+        self, frame: Frame, fit: Fit, check: PairCheck, goal: Goal, known: Evidence,
+        *, counts_unmeasured: bool = False,
+    ) -> tuple[Fit, RenderedView | None, Evidence]:  # fmt: skip
+        """The fit joined with its outline, the model there, and the evidence of that pose."""
+        fit, view, agreement = self._settle(frame, fit, check, counts_unmeasured)
+        return fit, view, self._evidence_of_pose(known, frame, fit, agreement, goal)
 
     def _find_foreground(
         self, frame: Frame, fit: Fit, view: RenderedView, checks: PairChecks
@@ -118,7 +127,7 @@ class PoseJudge:
     def _settle(
         self, frame: Frame, fit: Fit, check: PairCheck, counts_unmeasured: bool
     ) -> tuple[Fit, RenderedView | None, Agreement | None]:
-        """The fit joined with the outline (`OutlineMeter.join`), the model there, the agreement.
+        """The fit joined with its outline, the model at its pose, and how far it agrees.
 
         The check has compared a fit on the model where it was matched. Free fits, and those that
         the outline moved, are compared at their pose.
