@@ -78,8 +78,8 @@ class OutlineMeter:
             fit: of the bone.
             coarse_px: (h, w) coarse disparity of whatever lies in its box.
             noise_variance_ratio: variance of the surface's noise over the one it claims.
-            counts_unmeasured: edges count although the bone is not measured inside them, where the
-                coarse map knows that nothing is nearer there.
+            counts_unmeasured: edges count although the bone is not measured inside them, unless the
+                coarse map has something nearer there.
         """
         estimate, view = fit.estimate, fit.measured.rendered
         if view is None or not estimate.has_finite_covariance:
@@ -87,8 +87,8 @@ class OutlineMeter:
         found = fit.measured.disparity
         if counts_unmeasured and coarse_px is not None:
             nearest_px = self._geometry.disparity_map_px(view.depth_mm) + _NEARER_PX
-            # Where the coarse map knows nothing the comparison is False.
-            is_free = coarse_px <= nearest_px
+            # Of a flank that one eye hardly sees neither model nor coarse map know anything there.
+            is_free = ~(coarse_px > nearest_px)
             found = replace(found, origin=np.where(is_free, Origin.MATCHED, found.origin))
         block = self.block(pair, fit.pose, view, found, coarse_px)
         centre_mm = fit.pose.apply(self._model.centre_mm)
