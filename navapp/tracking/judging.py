@@ -79,15 +79,14 @@ class PoseJudge:
         check = checks.check(fit.measured, fit.pose).result()
         depth_mm = float(fit.pose.apply(model.centre_mm)[2])
         known = self._evidence_of_pair(check.health, depth_mm)
-        joined, view, evidence = self._join(frame, fit, check, goal, known)
-        verdict = decide(evidence)
+        looks = [self._look(frame, fit, check, goal, known)]
         # Too little may be left of a bone that was worked on: then all of its outline counts. On a
         # whole one that goes wrong: what is not measured lies under a hand.
-        if model.bone.lid is not None and evidence.seen_excess_mm > 0.0:
-            second = self._join(frame, fit, check, goal, known, counts_unmeasured=True)
-            if (again := decide(second[2])).rank < verdict.rank:
-                (joined, view, evidence), verdict = second, again
-        fit = joined
+        if model.bone.lid is not None and looks[0][2].seen_excess_mm > 0.0:
+            looks.append(self._look(frame, fit, check, goal, known, counts_unmeasured=True))
+        # Of equally good ones the first.
+        fit, view, evidence = min(looks, key=lambda look: decide(look[2]).rank)
+        verdict = decide(evidence)
         has_bound = verdict.predicted_tre_mm is not None
         if has_bound and "judge" in self._settings.leaves_out:
             verdict = replace(verdict, status=Status.OK, reasons=())
@@ -103,11 +102,11 @@ class PoseJudge:
             model.bone.name, estimate, verdict, frame.watch.timings, rows, foreground
         )
 
-    def _join(
+    def _look(
         self, frame: Frame, fit: Fit, check: PairCheck, goal: Goal, known: Evidence,
         *, counts_unmeasured: bool = False,
     ) -> tuple[Fit, RenderedView | None, Evidence]:  # fmt: skip
-        """The fit joined with its outline, the model there, and the evidence of that pose."""
+        """The fit joined with its outline, the model at its pose, and the evidence of that pose."""
         fit, view, agreement = self._settle(frame, fit, check, counts_unmeasured)
         return fit, view, self._evidence_of_pose(known, frame, fit, agreement, goal)
 

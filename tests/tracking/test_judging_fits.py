@@ -161,6 +161,29 @@ def test_out_of_view_there_is_nothing_to_judge() -> None:
     assert answer.estimate is None
 
 
+class TwoLooks(SurfaceAlone):
+    """Where all of the outline counts, its covariance is so many times as large."""
+
+    def __init__(self, times: float = 1.0) -> None:
+        super().__init__()
+        self._times = times
+
+    def join(self, *given, counts_unmeasured: bool) -> Fit:
+        fit = super().join(*given, counts_unmeasured=counts_unmeasured)
+        times = self._times if counts_unmeasured else 1.0
+        return replace(fit, estimate=fit.estimate.scale_noise(times))
+
+
+def judge_of(outline: SurfaceAlone, *, is_worked_on: bool) -> PoseJudge:
+    a = room()
+    bone = a.tracker.model.bone
+    lid = TriangleMesh(bone.mesh.vertices_mm[:3], np.array([[0, 1, 2]]))
+    model = RegistrationModel(replace(bone, lid=lid if is_worked_on else None))
+    judge = PoseJudge(SurfaceMeter(a.rig, model, a.tracker.meter.depth_mm), TrackerSettings())
+    judge.outline = outline
+    return judge
+
+
 @pytest.mark.parametrize(
     ("is_worked_on", "is_loose", "counted"),
     [(True, True, [False, True]), (True, False, [False]), (False, True, [False])],
@@ -168,13 +191,26 @@ def test_out_of_view_there_is_nothing_to_judge() -> None:
 def test_all_of_the_outline_counts_where_too_little_is_left_of_a_bone_that_was_worked_on(
     is_worked_on: bool, is_loose: bool, counted: list[bool]
 ) -> None:
-    a = room()
-    bone = a.tracker.model.bone
-    lid = TriangleMesh(bone.mesh.vertices_mm[:3], np.array([[0, 1, 2]]))
-    model = RegistrationModel(replace(bone, lid=lid if is_worked_on else None))
-    frame, fit = found_at_the_truth(a)
-    judge = PoseJudge(SurfaceMeter(a.rig, model, a.tracker.meter.depth_mm), TrackerSettings())
-    judge.outline = outline = SurfaceAlone()
+    frame, fit = found_at_the_truth(room())
+    outline = SurfaceAlone()
     goal = replace(GOAL, seen_limit_mm=1e-3 if is_loose else 5.0)
-    judge.judge(frame, fit, goal)
+    judge_of(outline, is_worked_on=is_worked_on).judge(frame, fit, goal)
     assert outline.counted_unmeasured == counted
+
+
+@pytest.mark.parametrize(("times", "is_better"), [(0.01, True), (0.5, False), (100.0, False)])
+def test_of_two_looks_at_an_outline_the_better_verdict_counts(
+    times: float, is_better: bool
+) -> None:
+    frame, fit = found_at_the_truth(room())
+    alone = judge_of(SurfaceAlone(), is_worked_on=True).judge(frame, fit, GOAL)
+    assert alone.verdict.status is Status.OK
+    # A little less than what one look leaves open.
+    goal = replace(GOAL, seen_limit_mm=0.5 * alone.verdict.predicted_tre_mm)
+    found = judge_of(TwoLooks(times), is_worked_on=True).judge(frame, fit, goal)
+    assert found.verdict.status is (Status.OK if is_better else Status.DEGRADED)
+    expected_mm = alone.verdict.predicted_tre_mm
+    if is_better:
+        assert found.verdict.predicted_tre_mm < 0.5 * expected_mm
+    else:
+        assert found.verdict.predicted_tre_mm == pytest.approx(expected_mm)

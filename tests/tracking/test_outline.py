@@ -129,7 +129,7 @@ def test_without_bone_inside_or_with_something_nearer_beside_nothing_counts() ->
     assert len(block_at(fit, far).residual) == len(block_at(fit).residual)
 
 
-def test_edges_without_bone_inside_count_when_asked_for_and_nothing_nearer_is_there() -> None:
+def test_edges_without_bone_inside_count_when_asked_for_unless_something_nearer_is_there() -> None:
     fit, unmeasured = fit_at(OFF), fit_at(OFF, is_measured=False)
     view = fit.measured.rendered
     far = np.full(view.mask.shape, 100.0, dtype=np.float32)
@@ -140,10 +140,11 @@ def test_edges_without_bone_inside_count_when_asked_for_and_nothing_nearer_is_th
         return meter().join(pair(), unmeasured, coarse_px, counts_unmeasured=True).pose
 
     everywhere = meter().join(pair(), fit, None).pose.matrix
-    np.testing.assert_array_equal(joined(far).matrix, everywhere)
-    np.testing.assert_array_equal(joined(on_it + np.float32(0.5)).matrix, everywhere)
-    for unfree in (hand_px, None):
-        assert joined(unfree) is unmeasured.pose
+    unknown = np.full(view.mask.shape, np.nan, dtype=np.float32)
+    for free_px in (far, on_it + np.float32(0.5), unknown):
+        np.testing.assert_array_equal(joined(free_px).matrix, everywhere)
+    for covered_px in (hand_px, None):
+        assert joined(covered_px) is unmeasured.pose
 
 
 def test_dark_pictures_leave_the_fit_alone() -> None:
