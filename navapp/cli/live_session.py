@@ -185,7 +185,7 @@ def make_controller(
 
 def _make_practice_steps(session: LiveSession) -> "PracticeSteps | None":
     """What makes in the simulated room what the operator confirms; None without such a room."""
-    from navapp.cli.practice_steps import PracticeSteps
+    from navapp.cli.practice_steps import PracticeSteps, read_thicknesses
 
     simulation = session.opened.simulation
     if simulation is None:
@@ -197,7 +197,7 @@ def _make_practice_steps(session: LiveSession) -> "PracticeSteps | None":
         for name, step in plan.content.steps.items()
         if name in room.names and step.bone in plan.bones
     }
-    return PracticeSteps(room, shared)
+    return PracticeSteps(room, shared, read_thicknesses(plan, simulation.caliper, shared))
 
 
 def _make_locator(session: LiveSession) -> "LocateCorners | None":

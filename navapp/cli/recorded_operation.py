@@ -6,10 +6,9 @@ from navapp.cli.session_folder import RecordedSession
 from navapp.control.commands import (
     CheckMirror,
     Command,
-    ConfirmStep,
     DistrustRig,
     Register,
-    WithdrawStep,
+    StepCommand,
 )
 from navapp.control.executors import Executor, InlineExecutor, RecordedExecutor
 from navapp.control.operators import CombinedOperator, Operator, RecordedOperator, ReplayOperator
@@ -64,9 +63,7 @@ def _find_facts(
         return []
     moved = None if options.order == "pingpong" else find_moved_rig(session, options)
     facts: list[tuple[int, Command]] = [] if moved is None else [moved]
-    facts += [
-        one for one in session.events.commands if isinstance(one[1], ConfirmStep | WithdrawStep)
-    ]
+    facts += [one for one in session.events.commands if isinstance(one[1], StepCommand)]
     return sorted(
         ((-1 if options.start > after else after, command) for after, command in facts),
         key=lambda fact: fact[0],

@@ -23,6 +23,7 @@ from navapp.control.commands import (
     OverrideGate,
     Propose,
     Quit,
+    ReadThickness,
     Reconnect,
     Register,
     Reject,
@@ -81,6 +82,9 @@ def command_to_json(command: Command) -> dict[str, Any]:
         return {"command": "override", "number": command.number, "reason": command.reason}
     if isinstance(command, _Named):
         return {"command": _NAMES[type(command)], "name": command.name}
+    if isinstance(command, ReadThickness):
+        thickness_mm = list(command.thickness_mm)
+        return {"command": "thickness", "name": command.name, "thickness_mm": thickness_mm}
     if isinstance(command, NudgeCross):
         nudge_px = [command.right_px, command.down_px]
         return {"command": "nudge_cross", "nudge_px": nudge_px}
@@ -119,6 +123,9 @@ def command_from_json(value: Mapping[str, Any]) -> Command:
             return OverrideGate(int(value["number"]), str(value["reason"]))
         if name in _READ_NAMED:
             return _READ_NAMED[name](str(value["name"]))
+        if name == "thickness":
+            thickness_mm = tuple(float(one) for one in value["thickness_mm"])
+            return ReadThickness(str(value["name"]), thickness_mm)
         if name == "nudge_cross":
             right_px, down_px = value["nudge_px"]
             return NudgeCross(int(right_px), int(down_px))

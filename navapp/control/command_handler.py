@@ -22,11 +22,13 @@ from navapp.control.commands import (
     OverrideGate,
     Propose,
     Quit,
+    ReadThickness,
     Reconnect,
     Register,
     Reject,
     SetProjector,
     Show,
+    StepCommand,
     ToggleDepth,
     ToggleEye,
     ToggleLayer,
@@ -134,7 +136,10 @@ class CommandHandler:
                 self._gates.enter(self._stage(command.number))
             case OverrideGate():
                 self._gates.override(self._stage(command.number), command.reason)
-            case ConfirmStep() | WithdrawStep() | ConfirmCondition() | WithdrawCondition():
+            case (
+                ConfirmStep() | WithdrawStep() | ReadThickness()
+                | ConfirmCondition() | WithdrawCondition()
+            ):  # fmt: skip
                 self._on_word(command)
             case TouchPoint() | CheckPicks() | DropPoint() | ForgetPoints():
                 self._on_touch(command)
@@ -199,7 +204,8 @@ class CommandHandler:
             self._session.add_event("mirror", text)
 
     def _on_word(
-        self, command: ConfirmStep | WithdrawStep | ConfirmCondition | WithdrawCondition
+        self,
+        command: StepCommand | ConfirmCondition | WithdrawCondition,
     ) -> None:
         """A person says what was made, or what is so."""
         session = self._session
@@ -209,12 +215,14 @@ class CommandHandler:
                     session.confirm_step(command.name)
                 case WithdrawStep():
                     session.withdraw_step(command.name)
+                case ReadThickness():
+                    session.read_thickness(command.name, command.thickness_mm)
                 case ConfirmCondition():
                     self._gates.confirm(command.name)
                 case WithdrawCondition():
                     self._gates.withdraw(command.name)
         except UsageError as error:
-            is_step = isinstance(command, ConfirmStep | WithdrawStep)
+            is_step = isinstance(command, StepCommand)
             self._refuse("step" if is_step else "gate", str(error))
 
     def _on_touch(self, command: TouchPoint | CheckPicks | DropPoint | ForgetPoints) -> None:

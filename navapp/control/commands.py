@@ -145,6 +145,19 @@ class WithdrawStep:
 
 
 @dataclass(frozen=True, slots=True)
+class ReadThickness:
+    """The thickness of the bone below a cut that is made, read with a caliper."""
+
+    name: str  # in the plan
+    # of each point of `navapp.resection.list_caliper_points`
+    thickness_mm: tuple[float, ...]
+
+
+# A person says what was made of a bone.
+StepCommand = ConfirmStep | WithdrawStep | ReadThickness
+
+
+@dataclass(frozen=True, slots=True)
 class TouchPoint:
     """Check on the patient: the pointer's tip rests on the bone; take that point."""
 
@@ -228,6 +241,7 @@ Command = (
     | WithdrawCondition
     | ConfirmStep
     | WithdrawStep
+    | ReadThickness
     | TouchPoint
     | CheckPicks
     | DropPoint

@@ -5,11 +5,20 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from drivers.frames import StereoFrame
+from navapp.control.rest_watch import RestWatch
 from navapp.control.states import StepLine
 from navapp.control.trackers import Trackers
 from navapp.errors import UsageError
 from navapp.geometry.mesh import TriangleMesh
-from navapp.resection import CutBone, Thickness, measure_thickness
+from navapp.resection import (
+    CaliperPoint,
+    CutBone,
+    Thickness,
+    find_face,
+    list_caliper_points,
+    measure_thickness,
+    needs_caliper,
+)
 from navapp.values import (
     BoneModel,
     Measured,
@@ -17,6 +26,7 @@ from navapp.values import (
     Plan,
     PlannedStep,
     PoseEstimate,
+    ResectionPlane,
     StageSpec,
     Status,
     TrackedFrame,
@@ -37,6 +47,7 @@ class _Known:
     seen_share: float | None = None  # of face or rim, in the newest look
     last: Measured | None = None  # as of `StepLine.last_measured`
     thickness: Thickness | None = None
+    remaining_mm: tuple[float, ...] = ()  # as a caliper read it
 
     def add(self, one: Measured, bone: BoneModel) -> None:
         """One more measurement of it."""
@@ -70,6 +81,12 @@ class MadeSteps:
         self._n_frames = 0
         self._known: dict[str, _Known] = {}
         self._n_made: Counter[str] = Counter()
+        self._rest_watches: dict[str, RestWatch] = {}  # by bone
+        self._caliper_points = {
+            name: _find_caliper_points(plan, step)
+            for name, step in plan.content.steps.items()
+            if step.bone in plan.bones and needs_caliper(step)
+        }
         for name in made:
             self.confirm(name)
 
@@ -114,11 +131,41 @@ class MadeSteps:
         self._trackers.set_bone(bone)
         return bone
 
+    def read_thickness(self, name: str, thickness_mm: Sequence[float]) -> CutBone:
+        """The thickness below a cut was read with a caliper: its bone, followed by that face.
+
+        Raises:
+            UsageError: no such cut is made, its bone is followed by more than a face, or the
+                readings do not tell one (`find_face`).
+        """
+        step = self._plan.content.steps.get(name)
+        bones = self._trackers.bones
+        if step is None or step.bone not in bones or name not in bones[step.bone].cuts:
+            raise UsageError(
+                f"'{name}' is no cut that was confirmed", subject=name, remedy="confirm it first"
+            )
+        if not needs_caliper(step):
+            raise UsageError(
+                f"the {step.bone} is followed by its surface, whatever is left below '{name}'",
+                subject=name,
+                remedy="read no thickness of it",
+            )
+        known = bones[step.bone]
+        face = find_face(known.planned, known.cuts[name], thickness_mm)
+        bone = known.with_caliper_face(name, face)
+        self._trackers.set_bone(bone)
+        # No picture has measured it: what its step tells is the thickness alone.
+        told = self._known[name]
+        told.thickness = measure_thickness(known.planned, face)
+        told.remaining_mm = tuple(thickness_mm)
+        return bone
+
     def forget_measured(self, bone: str) -> None:
         """What was measured with an earlier registration of a bone counts no longer."""
         bones = self._trackers.bones
         for name in bones[bone].made if bone in bones else ():
-            self._known[name] = _Known(last=self._known[name].last)
+            if name not in bones[bone].caliper_faces:
+                self._known[name] = _Known(last=self._known[name].last)
         if bone in bones and bones[bone].faces:
             self._trackers.set_bone(bones[bone].without_faces())
 
@@ -152,6 +199,8 @@ class MadeSteps:
             self._n_made[name],
             known.last,
             known.thickness,
+            self._caliper_points.get(name, ()),
+            known.remaining_mm,
         )
 
     def measure(
@@ -160,18 +209,25 @@ class MadeSteps:
         """Faces and holes of a bone in a frame in which its pose is OK: one in its turn, or all.
 
         With a pose that nobody has accepted they are told, where every frame tells what it can, but
-        not kept.
+        not kept. None are in frames that are not exposed at once while the bone moves.
         """
         turn, rest = divmod(self._n_frames, self._frames_between)
         self._n_frames += 1
-        if tracked is None or tracked.verdict.status is not Status.OK or rest:
+        if tracked is None or tracked.estimate is None or tracked.verdict.status is not Status.OK:
+            return {}
+        watch = self._rest_watches.get(tracked.bone)
+        if watch is None:
+            watch = RestWatch(self._trackers.corners_mm(tracked.bone))
+            self._rest_watches[tracked.bone] = watch
+        if not watch.is_at_rest(frame, tracked.estimate.camera_from_bone) or rest:
             return {}
         bone, is_each = self._trackers.bone(tracked.bone), self._frames_between == 1
         # A part covers the faces that it sits on.
-        names = () if bone.parts else (*bone.cuts, *bone.whole_holes)
+        measurable = (name for name in bone.cuts if name not in bone.caliper_faces)
+        names = () if bone.parts else (*measurable, *bone.whole_holes)
         if names and not is_each:
             names = (names[turn % len(names)],)
-        if tracked.estimate is None or not (is_accepted or is_each):
+        if not (is_accepted or is_each):
             return {}
         looked = {name: self._look(frame, bone, tracked.estimate, name) for name in names}
         found = {name: one for name, one in looked.items() if one is not None and one.is_told}
@@ -205,3 +261,12 @@ class MadeSteps:
         }
         if known:
             self._trackers.set_bone(bone.with_faces(known))
+
+
+def _find_caliper_points(plan: Plan, step: PlannedStep) -> tuple[CaliperPoint, ...]:
+    """Where a caliper is read; empty where the plan allows no reading."""
+    try:
+        cut = step if isinstance(step, ResectionPlane) else None
+        return () if cut is None else list_caliper_points(plan.bones[cut.bone], cut)
+    except UsageError:
+        return ()

@@ -18,9 +18,11 @@ from navapp.control.commands import (
     OverrideGate,
     Propose,
     Quit,
+    ReadThickness,
     Register,
     Reject,
     Show,
+    StepCommand,
     WithdrawCondition,
     WithdrawStep,
 )
@@ -47,6 +49,7 @@ class ScriptStep(Section):
         "override",
         "made",
         "unmade",
+        "thickness",
         "blank",
         "show",
         "wait",
@@ -62,7 +65,10 @@ class ScriptStep(Section):
     stage: str = ""
     """Of stage and override: name or number."""
     name: str = ""
-    """Of confirm and withdraw: the condition; of made and unmade: the cut, hole or part."""
+    """Of confirm and withdraw: the condition; of made, unmade and thickness: the cut, hole or
+    part."""
+    thickness_mm: tuple[float, ...] = ()
+    """Of thickness: what a caliper reads below the cut, in the order of docs/resection.md."""
     reason: str = ""
     """Of override."""
     until: str = ""
@@ -143,7 +149,7 @@ class ScriptedOperator:
             self._entering = command.number
         # A session without gates asks for nothing, and says so of every condition.
         is_asked = isinstance(command, ConfirmCondition | WithdrawCondition) and snapshot.time_out
-        self._is_word = isinstance(command, ConfirmStep | WithdrawStep) or bool(is_asked)
+        self._is_word = isinstance(command, StepCommand) or bool(is_asked)
         return [command]
 
     @property
@@ -250,6 +256,8 @@ def _command_of(step: ScriptStep) -> Command:
             return ConfirmStep(step.name)
         case "unmade":
             return WithdrawStep(step.name)
+        case "thickness":
+            return ReadThickness(step.name, step.thickness_mm)
         case "blank":
             return Blank()
         case "show":
@@ -313,6 +321,7 @@ _NEEDED = {
     "withdraw": "name",
     "made": "name",
     "unmade": "name",
+    "thickness": "thickness_mm",
     "override": "reason",
     "wait": "until",
     "expect": "text",

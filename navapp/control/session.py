@@ -1,6 +1,7 @@
 """What a session knows, and every way in which frames and commands change it."""
 
 from collections import Counter
+from collections.abc import Sequence
 
 from drivers.clock import Clock
 from drivers.frames import StereoFrame
@@ -220,6 +221,15 @@ class Session:
             UsageError: it was not confirmed.
         """
         self._take_step(self._steps.withdraw(name), f"{name} withdrawn")
+
+    def read_thickness(self, name: str, thickness_mm: Sequence[float]) -> None:
+        """The thickness below a cut that is made was read.
+
+        Raises:
+            UsageError: as of `MadeSteps.read_thickness`.
+        """
+        bone = self._steps.read_thickness(name, thickness_mm)
+        self._take_step(bone, f"thickness below {name} read")
 
     def _take_step(self, bone: CutBone, text: str) -> None:
         name = bone.planned.name

@@ -13,7 +13,7 @@ from navapp.geometry.box import Box
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.limb import LimbMeasurement
-from navapp.resection import Thickness
+from navapp.resection import CaliperPoint, Thickness
 from navapp.tools.patient_check import CheckAnswer, CheckResult
 from navapp.tools.tool import SeenTool, ToolKind
 from navapp.tools.tool_on_bone import HoleOffset, ToolOnBone
@@ -166,7 +166,17 @@ class StepLine:
     n_made: int = 0  # how often it was confirmed: a cut may be made again
     # the newest measurement since it was confirmed, whatever was registered anew since then.
     last_measured: Measured | None = None
-    thickness: Thickness | None = None  # of what a measured cut took off
+    # of the piece that a cut took off, by its measured face or by the caliper.
+    thickness: Thickness | None = None
+    # of a cut after which the bone is tracked by its face: where a caliper is read, and the mm that
+    # it read.
+    caliper_points: tuple[CaliperPoint, ...] = ()
+    remaining_mm: tuple[float, ...] = ()
+
+    @property
+    def is_caliper_readable(self) -> bool:
+        """A cut that is made, below which a caliper can be read, or read again."""
+        return self.is_made and bool(self.caliper_points)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from drivers.frames import StereoFrame
+from navapp.face_tracking import FaceTracker
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray
 from navapp.preop import build_aspects
@@ -97,7 +98,7 @@ class Trackers:
         # The production chain needs no views to follow a bone; those of the paper do.
         is_ours = self._settings.method == "bimcc"
         aspects = None if is_ours else self._plan.aspects.get(bone)
-        made = self._make(now.model, aspects)
+        made = self._make(now, aspects)
         with self._lock:
             return self._with_aspects.get(key) or self._trackers.setdefault(key, made)
 
@@ -134,7 +135,9 @@ class Trackers:
         known = bone.faces.get(name)
         expected = None if known is None else known.as_plane
         others = tuple(cut for other, cut in bone.known_cuts.items() if other != name)
-        return meter.measure(frame.left, frame.right, estimate, bone.cuts[name], others, expected)
+        return meter.measure(
+            frame.left, frame.right, estimate, bone.cuts[name], others, expected=expected
+        )
 
     def measure_hole(
         self, frame: StereoFrame, bone: CutBone, estimate: PoseEstimate, name: str
@@ -198,7 +201,7 @@ class Trackers:
         }
         if not faces:
             return answers
-        tracker = self._make(bone.with_faces(faces).model, None)
+        tracker = self._make(bone.with_faces(faces), None)
         prior = Prior({stage.bone: estimate.camera_from_bone})
         closer = tracker.register(frame, prior, self.goal(stage))
         is_better = bool(closer) and closer[0].verdict.rank < best.verdict.rank
@@ -214,7 +217,9 @@ class Trackers:
     def _searching_tracker(self, bone: str, start: Prior) -> Tracker:
         """The bone's tracker, with aspects when there is no pose to start from."""
         cone = start.cones.get(bone)
-        if bone in start.left_from_bone or cone is None or cone.axis is None:
+        # A face is found from a pose alone.
+        is_by_face = self._is_tracked_by_face(self.bone(bone))
+        if is_by_face or bone in start.left_from_bone or cone is None or cone.axis is None:
             return self.tracker(bone)
         with self._lock:
             now = self._bones[bone]
@@ -228,10 +233,17 @@ class Trackers:
             aspects = build_aspects(now.model, cone.axis, cone.half_angle_deg)
         else:
             aspects = built.within(cone)
-        made = self._make(now.model, aspects)
+        made = self._make(now, aspects)
         with self._lock:
             self._trackers.pop(key, None)
             return self._with_aspects.setdefault(key, made)
 
-    def _make(self, bone: BoneModel, aspects: AspectGraph | None) -> Tracker:
-        return self._make_tracker(self._rig, bone, self._settings, aspects)
+    def _make(self, bone: CutBone, aspects: AspectGraph | None) -> Tracker:
+        if self._is_tracked_by_face(bone):
+            return FaceTracker(self._rig, bone, self._settings)
+        # Other methods do not count a caliper's errors: they track what is left beside the cut.
+        bone = replace(bone, caliper_faces={}) if bone.caliper_faces else bone
+        return self._make_tracker(self._rig, bone.model, self._settings, aspects)
+
+    def _is_tracked_by_face(self, bone: CutBone) -> bool:
+        return bool(bone.caliper_faces) and self._settings.method == "bimcc"

@@ -15,6 +15,7 @@ from navapp.devices.simulated_tool import SIMULATED_PLATES, make_touching
 from navapp.errors import ConfigurationError
 from navapp.geometry import RigidTransform, TriangleMesh
 from navapp.geometry.transform import FloatArray
+from sim_devices.caliper import Caliper
 from sim_devices.camera import NOMINAL_EXPOSURE_MS, Scene, SimulatedCamera
 from sim_devices.faults import Fault, FaultKind, FaultScript
 from sim_devices.planned_cuts import Cut
@@ -47,6 +48,7 @@ class Simulation:
     approach_half_angle_deg: float
     oracle: TruthOracle  # the truth, for evaluation after the run only
     planned_parts: Mapping[str, TriangleMesh]  # the components, in the coordinates of their bones
+    caliper: Caliper  # reads how thick a sawn bone is
     states: StateHistory  # tells the room what to show as made, by names of planned steps
 
 
@@ -189,6 +191,7 @@ def simulation_of(world: World, camera: SimulatedCamera) -> Simulation:
         approach_axis=np.asarray(world.approach_axis),
         approach_half_angle_deg=world.approach_half_angle_deg,
         oracle=TruthOracle(world, camera.world_time_ns),
+        caliper=Caliper(world),
         states=world.states,
     )
 

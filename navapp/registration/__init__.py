@@ -1,6 +1,6 @@
 """From a measured surface and a model to a pose with its covariance."""
 
-from navapp.registration.bimcc import estimate_at, fit_bimcc, fit_pose
+from navapp.registration.bimcc import fit_bimcc, fit_pose, solution_at
 from navapp.registration.bimcc_kernels import BimccSettings
 from navapp.registration.initial import find_initial
 from navapp.registration.model import RegistrationModel
@@ -31,7 +31,6 @@ __all__ = [
     "Scene",
     "ScoredPose",
     "distinct",
-    "estimate_at",
     "find_initial",
     "find_poses",
     "fit_bimcc",
@@ -43,6 +42,7 @@ __all__ = [
     "rank_fits",
     "register",
     "select_poses",
+    "solution_at",
     "solve_bimcc_literal",
     "solve_icp",
 ]

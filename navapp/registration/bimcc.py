@@ -94,13 +94,6 @@ def fit_coarsely(
     return fit.pose if fit.run_coarse().has_finished else None
 
 
-def estimate_at(
-    scene: Scene, model: RegistrationModel, pose: RigidTransform, settings: BimccSettings = DEFAULT
-) -> PoseEstimate:
-    """How well a pose (`scene_from_bone`) fits a scene, without moving it."""
-    return solution_at(scene, model, pose, settings).estimate
-
-
 def solution_at(
     scene: Scene,
     model: RegistrationModel,
@@ -110,7 +103,7 @@ def solution_at(
     *,
     is_converged: bool = True,
 ) -> Solution:
-    """A pose as the solution of some solver."""
+    """A pose (`scene_from_bone`) as the solution of some solver: how well it fits, unmoved."""
     fit = _Fit(scene, model, pose, settings)
     if len(scene) < MIN_POINTS:
         return fit.too_few_points(len(scene))

@@ -32,6 +32,7 @@ from navapp.values import (
     PoseEstimate,
     ResectionPlane,
 )
+from navapp.values.faces import MOST_OFF_PLAN_MM
 
 # All chosen. A saw's face is looked for so far from where it is expected, along the view.
 _BAND_MM = 8.0
@@ -42,12 +43,10 @@ _MAX_ROUNDS, _REST_PX = 6, 0.02
 _NEAR_PX = 1.0
 # By how much highlights move a face (standard deviation, as tests.bench.face_highlights shows it on
 # chamfers), and which share of the difference of the planes with and without them is left open.
-_HIGHLIGHT_PX, _LEFT_OPEN = 0.1, 0.5
+HIGHLIGHT_PX, _LEFT_OPEN = 0.1, 0.5
 # The lamp may be so much less blue than white is in the pictures (standard deviation).
 _OTHER_LAMP = 0.8
 _SURELY_MOVED = 7.81  # chi-square of 3 degrees of freedom at 95 %
-# A saw misses its plan by no more: what is flat, but lies further off, is something else.
-_MOST_OFF_MM, _MOST_TILT_DEG = 4.0, 6.0
 
 
 class FaceMeter:
@@ -66,7 +65,9 @@ class FaceMeter:
         estimate: PoseEstimate,
         planned: ResectionPlane,
         others: Sequence[Cut],
+        *,
         expected: ResectionPlane | None = None,
+        row_shifts_px: tuple[FloatArray, FloatArray] | None = None,
     ) -> MeasuredFace | None:
         """One face, against its plan.
 
@@ -77,11 +78,19 @@ class FaceMeter:
             planned: the cut whose face is measured.
             others: the other cuts of the bone that have been made, as far as they are known.
             expected: where it lay in an earlier picture.
+            row_shifts_px: as of `Rectifier.rectify`: with them the pose is that at their time.
 
         Returns:
-            None when too little of it is seen.
+            None when too little of it is seen, or it lies too far from the plan.
         """
         rectified_from_bone = self._geometry.rectified_from_left @ estimate.camera_from_bone
+
+        def rectify(view: FaceView, *, is_grey: bool = False) -> RectifiedPair:
+            return self._rectifier.rectify(
+                left, right, view.box, self._band_px(view),
+                is_grey=is_grey, row_shifts_px=row_shifts_px,
+            )  # fmt: skip
+
         plane, pair = expected or planned, None
         # From the plan, where a saw may have missed it, the first look is a wide one.
         is_far = expected is None
@@ -91,14 +100,14 @@ class FaceMeter:
             if view is None:
                 return None
             if pair is None or view.box.intersect(pair.box) != view.box:
-                pair = self._rectify(left, right, view)
+                pair = rectify(view, is_grey=True)
             fit = self._fit(replace(pair, box=view.box), view, coefficients, is_far=is_far)
             if fit is None:
                 return None
             plane = self._plane_in_bone(fit, plane, rectified_from_bone)
             moved_px = self._moved_px(fit.coefficients - coefficients, view)
             if not is_far and moved_px < _REST_PX:
-                fit = self._choose_plane(left, right, replace(pair, box=view.box), view, fit)
+                fit = self._choose_plane(replace(pair, box=view.box), rectify(view), view, fit)
                 if fit is None:
                     return None
                 share = fit.is_on.sum() * _STRIDE_PX**2 / max(view.n_whole, 1)
@@ -106,7 +115,7 @@ class FaceMeter:
                     fit, self._geometry, estimate, self._bone, self._quality, planned,
                     min(float(share), 1.0),
                 )  # fmt: skip
-                return face if _is_of_plan(face) else None
+                return face if face.is_near_plan else None
             is_far = False
         return None
 
@@ -116,10 +125,6 @@ class FaceMeter:
         normal = rectified_from_bone.rotate(plane.normal[None])[0]
         distance_mm = float(normal @ rectified_from_bone.apply(plane.point_mm[None])[0])
         return disparity_coefficients(normal, distance_mm, self._geometry)
-
-    def _rectify(self, left: Image, right: Image, view: FaceView) -> RectifiedPair:
-        band_px = self._band_px(view)
-        return self._rectifier.rectify(left, right, view.box, band_px, is_grey=True)
 
     def _band_px(self, view: FaceView) -> tuple[float, float]:
         """Smallest and largest disparity on the face, and around it."""
@@ -150,7 +155,7 @@ class FaceMeter:
         return self._fit_pixels(found, inside, fit.coefficients, _NEAR_PX)
 
     def _choose_plane(
-        self, left: Image, right: Image, grey: RectifiedPair, view: FaceView, fit: DisparityPlane
+        self, grey: RectifiedPair, pair: RectifiedPair, view: FaceView, fit: DisparityPlane
     ) -> DisparityPlane | None:
         """A plane that highlights have not moved, or how far they may have moved it in its bound.
 
@@ -160,7 +165,6 @@ class FaceMeter:
         Returns:
             None where too little of the face is not clipped.
         """
-        pair = self._rectifier.rectify(left, right, view.box, self._band_px(view))
         is_clipped = self._find_clipped(pair, view, fit.coefficients)
         if (is_clipped & view.is_face).any():
             view = replace(view, is_face=view.is_face & ~grow(is_clipped, RIM_PX))
@@ -204,14 +208,14 @@ class FaceMeter:
         u, v, _ = places.mean(axis=0)
         half_u, half_v, _ = np.maximum(0.5 * np.ptp(places, axis=0), 1.0)
         for deviation in ((0.0, 0.0, 1.0), (1.0, 0.0, -u) / half_u, (0.0, 1.0, -v) / half_v):
-            fit = fit.with_error(_HIGHLIGHT_PX * np.asarray(deviation))
+            fit = fit.with_error(HIGHLIGHT_PX * np.asarray(deviation))
         return fit
 
     def _reach_px(self, box: Box, coefficients: FloatArray) -> float:
         """How far a saw may have missed, in disparity: along the view at most."""
         middle = self._places(np.array([[box.x + box.width // 2, box.y + box.height // 2]]))
         depth_mm = self._geometry.depth_mm(float(middle[0] @ coefficients))
-        nearer_px = self._geometry.disparity_px(depth_mm - _MOST_OFF_MM)
+        nearer_px = self._geometry.disparity_px(depth_mm - MOST_OFF_PLAN_MM)
         return nearer_px - self._geometry.disparity_px(depth_mm)
 
     def _fit_pixels(
@@ -266,11 +270,6 @@ class FaceMeter:
         rows, columns = np.nonzero(view.is_face)
         pixels = np.column_stack([columns + view.box.x, rows + view.box.y])
         return float(np.abs(self._places(pixels) @ change).max(initial=0.0))
-
-
-def _is_of_plan(face: MeasuredFace) -> bool:
-    is_near = abs(face.offset_mm) <= _MOST_OFF_MM
-    return is_near and face.angle_deg <= _MOST_TILT_DEG
 
 
 def _without_specks(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -6,12 +6,16 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from navapp.geometry.mesh import TriangleMesh, join_meshes
 from navapp.geometry.mesh_sections import clip_below, fill_section, find_piece, section_lines
 from navapp.geometry.transform import FloatArray
-from navapp.values import BoneModel, DrillAxis, Part, ResectionPlane
+from navapp.values import BoneModel, DrillAxis, MeasuredFace, Part, ResectionPlane
 from navapp.values.part_shapes import part_mesh
+
+# Rounding: a vertex so near to a face lies on it.
+_ON_FACE_MM = 1e-3
 
 
 class Cut(NamedTuple):
@@ -96,6 +100,22 @@ def cut_surface(mesh: TriangleMesh, planes: Sequence[ResectionPlane]) -> Triangl
         faces += [] if face is None else [face]
         skin = clip_below(skin, heights_over(skin, Cut(plane, 0.0)))
     return join_meshes(skin, *faces)
+
+
+def close_with_face(bone: BoneModel, face: MeasuredFace) -> BoneModel:
+    """What a camera sees of a bone below a face, closed by the face: to be followed by it."""
+    seen = bone.make_seen_surface()
+    mesh = cut_surface(seen, [face.as_plane]).without_unused_vertices()
+    _, nearest = cKDTree(seen.vertices_mm).query(mesh.vertices_mm)
+    is_on_face = face.as_plane.heights_mm(mesh.vertices_mm) > -_ON_FACE_MM
+    return BoneModel(
+        bone.name,
+        mesh,
+        bone.side,
+        cartilage_sd_mm=np.where(is_on_face, 0.0, bone.cartilage_sd_mm[nearest]),
+        surface_sd_mm=bone.surface_sd_mm,
+        face=face,
+    )
 
 
 def _height_over_mm(mesh: TriangleMesh, plane: ResectionPlane) -> FloatArray:

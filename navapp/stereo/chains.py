@@ -40,9 +40,7 @@ class StereoAnswer:
     timings: FrameTimings
 
 
-def match_scene(
-    pair: RectifiedPair, band_px: tuple[float, float], *, fills: bool, max_gap_px: int | None = None
-) -> StereoAnswer:
+def match_scene(pair: RectifiedPair, band_px: tuple[float, float], *, fills: bool) -> StereoAnswer:
     """The whole scene, edges and all: every match is kept, refined where the texture allows.
 
     Census and semi-global matching at full resolution.
@@ -51,7 +49,6 @@ def match_scene(
         pair: rectified grey pictures; the part of `pair.box` inside them is matched.
         band_px: smallest and largest disparity expected.
         fills: weighted least squares fill, in the paper's directions.
-        max_gap_px: a pixel further from what was measured stays unknown; None fills everything.
     """
     watch = Stopwatch()
     pair = clip_box(pair)
@@ -59,8 +56,7 @@ def match_scene(
     if not found.agreement >= LEAST_AGREEMENT:
         return _nothing(pair, _why(found.agreement), watch)
     left = refine_scene(pair, found.left)
-    fill = FillSettings(max_gap_px=max_gap_px) if fills else None
-    return _answer(pair, left, found, fill, watch)
+    return _answer(pair, left, found, FillSettings() if fills else None, watch)
 
 
 def match_surface(
@@ -69,7 +65,8 @@ def match_surface(
     """Smooth surfaces for measuring: to a part of a pixel, or unknown.
 
     Census and semi-global matching, at half resolution where that leaves enough of the picture,
-    tell where; `refine_surface` measures. Arguments as for `match_scene`.
+    tell where; `refine_surface` measures. Arguments as for `match_scene`; a pixel further than
+    `max_gap_px` from what was measured stays unknown, None fills everything.
     """
     watch = Stopwatch()
     pair = clip_box(pair)

@@ -25,7 +25,7 @@ from navapp.tracking.search.highlights import HighlightSearch
 from navapp.tracking.search.near import NearSearch
 from navapp.tracking.search.whole_view import WholeViewSearch
 from navapp.tracking.settings import TrackerSettings
-from navapp.tracking.surface_meter import NEAR_VIEW, WIDE_VIEW, SurfaceMeter
+from navapp.tracking.surface_meter import WIDE_VIEW, SurfaceMeter
 from navapp.tracking.tracker import Tracker
 from navapp.values import (
     AspectGraph,
@@ -75,7 +75,8 @@ class BimccTracker(Tracker):
         # the box of section 3.2.1.
         frame = self.begin_predicted(pictures, state)
         if state.n_lost == 0:
-            best = self._follow_closer(frame, self._follow(frame, state, goal), state, goal)
+            best = self._follow(frame, state, goal)
+            best = self.follow_closer(frame, best, lambda again: self._follow(again, state, goal))
         else:
             best = self.look_near(frame, goal)
         if _is_searched_after_loss(best.verdict, state):
@@ -88,21 +89,6 @@ class BimccTracker(Tracker):
         best = best.with_cause(self.find_cause(frame, state, best))
         # Update the motion, and the box.
         return self.update(best, state, frame)
-
-    def _follow_closer(
-        self, frame: Frame, answer: TrackedFrame, state: TrackState, goal: Goal
-    ) -> TrackedFrame:
-        """Once more where the rows were exposed during another motion than was expected."""
-        pose, verdict = answer.left_from_bone, answer.verdict
-        is_doubted = is_place_doubted(verdict) or Reason.JUMPED in verdict.reasons
-        if frame.times is None or pose is None or is_doubted:
-            return answer
-        times = frame.times.with_motion_to(self.rectify_pose(pose))
-        if times is None:
-            return answer
-        again = self.begin(frame.pictures, pose, NEAR_VIEW, frame.watch, times, frame.predicted)
-        closer = self._follow(again, state, goal)
-        return closer if closer.verdict.rank <= verdict.rank else answer
 
     def _follow(self, frame: Frame, state: TrackState, goal: Goal) -> TrackedFrame:
         """The bone near the start of a frame."""

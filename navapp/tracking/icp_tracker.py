@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
-from navapp.registration import estimate_at, solve_icp
+from navapp.registration import solution_at, solve_icp
 from navapp.registration.best_view import find_best_view
 from navapp.registration.verdict import Goal
 from navapp.stereo import match_baseline
@@ -49,7 +49,14 @@ class IcpTracker(Tracker):
 
     Without `aspects` the expected pose stands for the best view. About `n_points` of what
     is matched are paired.
+
+    Attributes:
+        fills: occlusions are filled before the Gaussian filter.
+        n_among: the model's points are paired with the nearest of at least so many scene points.
     """
+
+    fills = False
+    n_among = 0
 
     def __init__(
         self,
@@ -106,24 +113,19 @@ class IcpTracker(Tracker):
 
     def measure(self, frame: Frame, start: RigidTransform, margins: Margins) -> Measurement | None:
         """What is matched around a pose: sum of gradients, left-right check, Gaussian filter."""
-        return self._match(frame, start, margins, self.n_points, fills=False)
-
-    def _match(
-        self, frame: Frame, start: RigidTransform, margins: Margins, n_points: int, *, fills: bool
-    ) -> Measurement | None:
         region = self.meter.find_region(start, margins)
         if region is None:
             return None
         box, band_px = region
-        answer = match_baseline(replace(frame.pair, box=box), band_px, fills=fills)
+        answer = match_baseline(replace(frame.pair, box=box), band_px, fills=self.fills)
         frame.watch.add(answer.timings)
-        return self.meter.take_surface(answer.disparity, n_points)
+        return self.meter.take_surface(answer.disparity, max(self.n_points, self.n_among))
 
     def estimate(self, frame: Frame, measured: Measurement, start: RigidTransform) -> PoseEstimate:
         """The pose by ICP, refined on the contour."""
         found = solve_icp(measured.scene, self.model, start, self.n_points).estimate
         pose = self.judge.outline.refine(frame.pair, found.camera_from_bone, measured.disparity)
-        refined = estimate_at(measured.scene, self.model, pose)
+        refined = solution_at(measured.scene, self.model, pose).estimate
         reasons = tuple(dict.fromkeys((*found.reasons, *refined.reasons)))
         return replace(refined, iterations=found.iterations, reasons=reasons)
 

@@ -115,18 +115,16 @@ class OutlineMeter:
             measured: on the model, in the view's box.
             coarse_px: (h, w) coarse disparity of whatever lies in that box.
         """
-        rotation, translation_mm = np.array(pose.rotation), np.array(pose.translation_mm)
 
         def find_edges(
             picture: Image, eye: Eye, depth_mm: NDArray[np.float32], first_column: int
         ) -> tuple[FloatArray, ...]:
-            rim = find_rim(self.ridges, rotation, translation_mm, eye)
-            rim = thin_rim(_only(rim, is_outline(rim, depth_mm, first_column, view.box.y)))
+            rim = self.find_rim(pose, eye, depth_mm, (first_column, view.box.y))
             offset_px = measure_edge_offsets(picture, rim)
             is_found = np.isfinite(offset_px)
-            rim, offset_px = _only(rim, is_found), offset_px[is_found]
+            rim, offset_px = select_points(rim, is_found), offset_px[is_found]
             is_free = self._is_free(rim, view.box, measured, coarse_px)
-            return offset_px[is_free], *self._linearise(_only(rim, is_free), eye, pose)
+            return offset_px[is_free], *self._linearise(select_points(rim, is_free), eye, pose)
 
         both = run_both(
             lambda: find_edges(pair.left, self._left, view.depth_mm, view.box.x),
@@ -136,6 +134,21 @@ class OutlineMeter:
             np.concatenate, zip(*both, strict=True)
         )
         return ResidualBlock(jacobian, offset_px, variance, n_sharing, _COMMON_SD_PX, arm_mm)
+
+    def find_rim(
+        self, pose: RigidTransform, eye: Eye, depth_mm: NDArray[np.float32], first: tuple[int, int]
+    ) -> Rim:
+        """What an eye should see of the outline.
+
+        Args:
+            pose: rectified left camera from bone.
+            eye: that looks.
+            depth_mm: (h, w) what it sees of the model, NaN beside it.
+            first: column and row of that buffer's first pixel in its picture.
+        """
+        rim = find_rim(self.ridges, np.array(pose.rotation), np.array(pose.translation_mm), eye)
+        thin: Rim = thin_rim(select_points(rim, is_outline(rim, depth_mm, *first)))
+        return thin
 
     def refine(
         self, pair: RectifiedPair, pose: RigidTransform, measured: DisparityMap
@@ -175,10 +188,10 @@ class OutlineMeter:
         """(N,) points with the bone measured inside and nothing nearer outside."""
         pixel = self._geometry.project(rim.point)
         inner = pixel[:, None] - _INSIDE_PX[:, None] * rim.normal[:, None]
-        is_measured = _look_up(measured.origin, inner, box, 0) == Origin.MATCHED
+        is_measured = look_up(measured.origin, inner, box, 0) == Origin.MATCHED
         is_free: NDArray[np.bool_] = is_measured.mean(axis=1) >= _LEAST_INSIDE
         if coarse_px is not None:
-            beside_px = _look_up(coarse_px, pixel + _BESIDE_PX * rim.normal, box, np.nan)
+            beside_px = look_up(coarse_px, pixel + _BESIDE_PX * rim.normal, box, np.nan)
             rim_px = self._geometry.disparity_map_px(rim.point[:, 2])
             is_free &= ~(beside_px > rim_px + _NEARER_PX)
         return is_free
@@ -197,13 +210,13 @@ class OutlineMeter:
         return jacobian, _EDGE_SIGMA_PX**2 + surface_px**2, n_sharing, arm
 
 
-def _only(rim: Rim, kept: NDArray[np.bool_]) -> Rim:
-    return Rim(
-        rim.point[kept], rim.pixel[kept], rim.normal[kept], rim.length[kept], rim.vertex[kept]
-    )
+def select_points(rim: Rim, kept: NDArray[np.bool_]) -> Rim:
+    """Those of a rim's points (N,) that are kept."""
+    kept_parts: Any = (part[kept] for part in rim)
+    return Rim(*kept_parts)
 
 
-def _look_up(values: NDArray[Any], pixels: FloatArray, box: Box, elsewhere: float) -> NDArray[Any]:
+def look_up(values: NDArray[Any], pixels: FloatArray, box: Box, elsewhere: float) -> NDArray[Any]:
     """Values (h, w) of a box at pixels (..., 2) of the picture, rounded; `elsewhere` out of it."""
     column = np.floor(pixels[..., 0] + 0.5).astype(int) - box.x
     row = np.floor(pixels[..., 1] + 0.5).astype(int) - box.y

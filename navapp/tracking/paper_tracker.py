@@ -9,25 +9,20 @@ from navapp.geometry.transform import RigidTransform
 from navapp.registration import solve_bimcc_literal
 from navapp.tracking.frame import Frame
 from navapp.tracking.icp_tracker import IcpTracker
-from navapp.tracking.surface_meter import Margins, Measurement
+from navapp.tracking.surface_meter import Measurement
 from navapp.values import PoseEstimate
-
-# The model's points are paired with the nearest of at most so many scene points (chosen).
-_N_AMONG = 20_000
 
 
 class PaperTracker(IcpTracker):
-    """Finds one bone from a pose, and follows it by its box: one fit in every frame."""
+    """Finds one bone from a pose, and follows it by its box: one fit in every frame.
 
-    def measure(self, frame: Frame, start: RigidTransform, margins: Margins) -> Measurement | None:
-        """What is matched around a pose, and filled before the Gaussian filter.
+    Occlusions are filled by weighted least squares: border ones from right to left, the others from
+    left to right, mismatches from both. Filled points are registered like matched ones, as the
+    paper has it.
+    """
 
-        Occlusions by weighted least squares: border ones from right to left, the others from left
-        to right, mismatches from both. Filled points are registered like matched ones, as the paper
-        has it.
-        """
-        n_points = max(self.n_points, _N_AMONG)
-        return self._match(frame, start, margins, n_points, fills=True)
+    fills = True
+    n_among = 20_000  # chosen
 
     def estimate(self, frame: Frame, measured: Measurement, start: RigidTransform) -> PoseEstimate:
         """The pose by BiMCC-ICP: equations (4) to (9) of section 3.2, algorithm 2."""

@@ -125,6 +125,7 @@ class SurfaceMeter:
         self.model, self.depth_mm = model, depth_mm
         self.rectifier = rectifier_of(rig)
         self.geometry = self.rectifier.geometry
+        self._relief_mm_px = RELIEF_LENGTH_MM * self.geometry.focal_px
         self._reduced = {n: ReducedRectifier(self.rectifier, n) for n in NearerSearch.REDUCTIONS}
         # Several steps ask for the same few poses. No method: it would keep the meter alive.
         bounds = partial(bounds_of, model.hull_mm, geometry=self.geometry)
@@ -248,9 +249,9 @@ class SurfaceMeter:
             found = refine_on_model(expected.pair, expected.support_px)
         is_expected = np.isfinite(expected.support_px)
         n_expected = max(int(np.count_nonzero(is_expected)), 1)
-        return self._measured_on_model(
+        return Measurement(
             found, lambda: self._cloud(remove_gap_rims(found, is_expected)),
-            found.n_matched / n_expected, expected, correlation_px,
+            found.n_matched / n_expected, correlation_px, expected.view, self._relief_mm_px,
         )  # fmt: skip
 
     def measure_on_samples(self, expected: Expected) -> Measurement:
@@ -265,20 +266,10 @@ class SurfaceMeter:
         matched_fraction = int(np.count_nonzero(thin.origin)) / n_asked
         found = _spread(thin, _SAMPLES_PX, support_px.shape)
         make_cloud = partial(found.reproject, self.geometry, _SAMPLES_PX)
-        return self._measured_on_model(found, make_cloud, matched_fraction, expected)
-
-    def _measured_on_model(
-        self,
-        found: DisparityMap,
-        make_cloud: Callable[[], SurfaceCloud],
-        matched_fraction: float,
-        expected: Expected,
-        correlation_px: float = MODEL_CORRELATION_PX,
-    ) -> Measurement:
-        relief_mm_px = RELIEF_LENGTH_MM * self.geometry.focal_px
         return Measurement(
-            found, make_cloud, matched_fraction, correlation_px, expected.view, relief_mm_px
-        )
+            found, make_cloud, matched_fraction, MODEL_CORRELATION_PX, expected.view,
+            self._relief_mm_px,
+        )  # fmt: skip
 
     def _cloud(self, found: DisparityMap) -> SurfaceCloud:
         """About `_N_POINTS` of the measured ones."""

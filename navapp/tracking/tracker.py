@@ -8,7 +8,7 @@ from dataclasses import replace
 from navapp.geometry.bands import begin_on_helper
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
-from navapp.registration import RegistrationModel, estimate_at
+from navapp.registration import RegistrationModel, solution_at
 from navapp.registration.verdict import Goal, is_place_doubted
 from navapp.tracking.box.tracker import BoxTracker
 from navapp.tracking.checks import PairChecks
@@ -115,6 +115,23 @@ class Tracker(ABC):
                 is_enough=lambda verdict: not is_place_doubted(verdict),
             )  # fmt: skip
 
+    def follow_closer(
+        self, frame: Frame, answer: TrackedFrame, follow: Callable[[Frame], TrackedFrame]
+    ) -> TrackedFrame:
+        """Once more where the rows were exposed during another motion than was expected.
+
+        That answer counts, whatever it is: the first one took a motion that is known to be wrong.
+        """
+        pose, verdict = answer.left_from_bone, answer.verdict
+        is_doubted = is_place_doubted(verdict) or Reason.JUMPED in verdict.reasons
+        if frame.times is None or pose is None or is_doubted:
+            return answer
+        times = frame.times.with_motion_to(self.rectify_pose(pose))
+        if times is None:
+            return answer
+        again = self.begin(frame.pictures, pose, NEAR_VIEW, frame.watch, times, frame.predicted)
+        return follow(again)
+
     def assess(
         self, pictures: StereoPictures, left_from_bone: RigidTransform, goal: Goal
     ) -> TrackedFrame:
@@ -128,7 +145,8 @@ class Tracker(ABC):
         frame.watch.lap("stereo")
         if measured is None:
             return self.judge.lost(Reason.OUT_OF_VIEW, frame.watch)
-        fit = Fit(estimate_at(measured.scene, self.model, frame.start, FREE_SETTINGS), measured)
+        found = solution_at(measured.scene, self.model, frame.start, FREE_SETTINGS)
+        fit = Fit(found.estimate, measured)
         frame.watch.lap("estimate")
         return self.judge.judge(frame, fit, replace(goal, seen_limit_mm=math.inf))
 

@@ -11,6 +11,7 @@ from navapp.control.commands import (
     EnterStage,
     ForgetPoints,
     OverrideGate,
+    ReadThickness,
     Register,
     SetProjector,
     ToggleLayer,
@@ -26,6 +27,7 @@ from navapp.ui.quiet_app import QuietApp
 from navapp.ui.session import Session
 from navapp.ui.start_page import StartChosen
 from navapp.ui.steps_page import step_of_key
+from navapp.ui.thickness_question import ThicknessQuestion
 from navapp.ui.tools_page import landmark_of_key
 from navapp.ui.view import View
 
@@ -88,6 +90,23 @@ class PageCommands(QuietApp):
     def action_withdraw_step(self, key: str) -> None:
         """Say that a step has not been made after all."""
         self._say_of(step_of_key(self._view.snapshot, key), WithdrawStep)
+
+    def action_read_thickness(self) -> None:
+        """Ask what a caliper reads below a cut: from the steps' page."""
+        step = next((one for one in self._view.snapshot.steps if one.is_caliper_readable), None)
+        if step is None:
+            self.bell()
+            self.notify("no cut that is made needs a thickness", severity="warning")
+            return
+        if self._view.is_silent:
+            self._say_silent(step.name)
+            return
+
+        def finish(reading: tuple[float, ...] | None) -> None:
+            if reading:
+                self._session.submit(ReadThickness(step.name, reading))
+
+        self.push_screen(ThicknessQuestion(self._view, step), finish)
 
     def action_touch_point(self, landmark: str) -> None:
         """Take a point of the check on the patient: from the tools' page."""

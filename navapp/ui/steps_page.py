@@ -1,5 +1,6 @@
 """The page of the stage's steps: which are made, and what was measured against plan."""
 
+from collections.abc import Sequence
 from typing import ClassVar
 
 from textual.app import ComposeResult
@@ -61,6 +62,8 @@ def _tell_made(step: StepLine, stage: StageSpec, symbols: Symbols) -> list[Conte
         return []
     if isinstance(step.measured, MeasuredHole):
         return _tell_hole(step.measured, stage, symbols)
+    if step.is_caliper_readable:
+        return _tell_caliper(step)
     if step.measured is not None:
         return [*_tell_measured(step.measured, stage, symbols), *_tell_thickness(step.thickness)]
     seen = "it is not seen, or was not looked for yet"
@@ -81,6 +84,26 @@ def _tell_thickness(thickness: Thickness | None) -> list[Content]:
         return []
     told = f"      thick  {thickness.mm:6.2f} mm   +-{thickness.bound_mm:5.2f}"
     return [Content(f"{told}  planned {thickness.planned_mm:.2f}")]
+
+
+def _tell_caliper(step: StepLine) -> list[Content]:
+    """What remains below a cut, as it was read, or what is to be read."""
+    names = [point.name for point in step.caliper_points]
+    planned_mm = [point.thickness_mm for point in step.caliper_points]
+
+    def tell(values_mm: Sequence[float]) -> str:
+        return ", ".join(f"{a} {b:.1f}" for a, b in zip(names, values_mm, strict=True))
+
+    planned = Content(f"      remaining as planned: {tell(planned_mm)}")
+    if not step.remaining_mm:
+        asked = "      not tracked until its remaining thickness is read (r), in mm"
+        return [Content.styled(asked, "$warning"), planned]
+    read = Content(f"      remaining as read (r: again): {tell(step.remaining_mm)}")
+    removed = step.thickness
+    if removed is None:
+        return [read, planned]
+    told = f"      removed {removed.mm:.2f} mm +-{removed.bound_mm:.2f}"
+    return [read, planned, Content(f"{told}, planned {removed.planned_mm:.2f}")]
 
 
 def _tell_hole(hole: MeasuredHole, stage: StageSpec, symbols: Symbols) -> list[Content]:
@@ -125,6 +148,7 @@ class StepsPage(PageScreen):
 
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("k", "dismiss", "back", show=False),
+        Binding("r", "app.read_thickness", "thickness", show=False),
         *(Binding(key, f"app.confirm_step('{key}')", "made", show=False) for key in STEP_KEYS),
         *(
             Binding(key.upper(), f"app.withdraw_step('{key}')", "not made", show=False)
@@ -132,10 +156,8 @@ class StepsPage(PageScreen):
         ),
     ]
 
-    page_title, keys = (
-        "steps of the stage",
-        " back  a letter: it is made  its capital: not made after all",
-    )
+    page_title = "steps of the stage"
+    keys = " back  letter: made  capital: not made after all  r thickness"
 
     def compose_page(self) -> ComposeResult:
         """Steps."""

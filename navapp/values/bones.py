@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from navapp.geometry.directions import ViewCone
 from navapp.geometry.mesh import TriangleMesh, vertex_normals
 from navapp.geometry.transform import FloatArray, read_only
+from navapp.values.faces import MeasuredFace
 
 Side = Literal["left", "right"]
 # Those that can be followed; the fibula only tells the side.
@@ -40,6 +41,8 @@ class BoneModel:
     surface_sd_mm: float = 0.0
     # what closes the bone where a stage has cut it; it hides what lies behind, but is not matched.
     lid: TriangleMesh | None = None
+    # the sawn face that closes its mesh and by which it is tracked; None: by its surface.
+    face: MeasuredFace | None = None
 
     def __post_init__(self) -> None:
         n = len(self.mesh.vertices_mm)

@@ -11,6 +11,8 @@ from navapp.values.contents import ResectionPlane
 
 # Of the length of two normal errors, and of the size of one: 95 % lie below so many deviations.
 LENGTH_95, SIZE_95 = 2.45, 1.96
+# A saw misses its plan by no more: what is flat, but lies further off, is something else; chosen.
+MOST_OFF_PLAN_MM, MOST_OFF_PLAN_DEG = 4.0, 6.0
 # A face of which less is seen, or that is known less well, is not told; chosen.
 LEAST_SHARE, MOST_DEG, MOST_MM = 0.25, 1.0, 0.4
 
@@ -66,6 +68,11 @@ class MeasuredFace:
     def bound_mm(self) -> float:
         """95 % bound of the error of the offset."""
         return SIZE_95 * math.sqrt(max(float(self.covariance[2, 2]), 0.0))
+
+    @property
+    def is_near_plan(self) -> bool:
+        """So near to its plan that a saw may have left it."""
+        return abs(self.offset_mm) <= MOST_OFF_PLAN_MM and self.angle_deg <= MOST_OFF_PLAN_DEG
 
     @property
     def is_told(self) -> bool:

@@ -6,6 +6,8 @@ Each knee and state is a session of `navapp run --headless --stage ...`, which b
 is usually entered; a script registers the bone and confirms what is made beyond that, so that the
 room shows it. Judged are the last 16 frames, all of the state. Knees differ in seed, side, sex and
 age; saw and drill miss as usual. The leg breathes.
+
+The room's caliper reads the thickness of the sawn patella (docs/devices.md).
 """
 
 import argparse

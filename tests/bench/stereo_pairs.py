@@ -15,7 +15,8 @@ import numpy as np
 
 from navapp.geometry import Box, RectifiedGeometry, RectifiedPair, RigidTransform
 from navapp.geometry.rectification import luma
-from navapp.stereo import StereoAnswer, chains, match_scene
+from navapp.stereo import chains, match_scene
+from navapp.stereo.chains import StereoAnswer
 
 
 @dataclass(frozen=True)

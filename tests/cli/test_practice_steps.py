@@ -3,10 +3,11 @@
 import pytest
 
 from navapp.cli.practice_steps import PracticeSteps
-from navapp.control.commands import ConfirmStep, WithdrawStep
+from navapp.control.commands import ConfirmStep, ReadThickness, WithdrawStep
 from sim_devices.operation import State, enter
 
 PLANNED = ("femoral_guide", "femur_distal", "femur_anterior", "femoral_implant", "tibia_proximal")
+READ = (13.5, 13.75, 13.25, 14.5)
 
 
 class FakeRoom:
@@ -33,9 +34,9 @@ class FakeRoom:
 class Session:
     """Tells every command that is submitted, as the controller does when it handles one."""
 
-    def __init__(self, stage: str, planned=PLANNED) -> None:
+    def __init__(self, stage: str, planned=PLANNED, thickness_mm=None) -> None:
         self.room, self.sent = FakeRoom(), []
-        self.steps = PracticeSteps(self.room, planned)
+        self.steps = PracticeSteps(self.room, planned, thickness_mm)
         self.steps.enter_stage(stage)
         assert self.sent == []
         self.steps.connect(self.submit)
@@ -62,6 +63,32 @@ def test_what_the_operator_confirms_is_made_in_the_room_and_undone_when_withdraw
     assert session.room.state.made == {"femoral_guide", "femur_distal"}
     session.submit(WithdrawStep("femur_distal"))
     assert session.room.state.made == {"femoral_guide"}
+
+
+def test_where_a_thickness_is_needed_the_practice_reads_it_after_the_step_is_made() -> None:
+    session = Session("opening", (*PLANNED, "patella"), {"patella": READ})
+    session.enter("patella")
+    session.sent.clear()
+    session.submit(ConfirmStep("patella"))
+    assert "patella" in session.room.state.made
+    assert session.sent == [ConfirmStep("patella"), ReadThickness("patella", READ)]
+    # Confirmed again it is refused: nothing is read.
+    session.submit(ConfirmStep("patella"))
+    assert session.sent[-1] == ConfirmStep("patella")
+    session.submit(WithdrawStep("patella"))
+    session.submit(ConfirmStep("patella"))
+    assert session.sent[-1] == ReadThickness("patella", READ)
+
+
+def test_a_step_that_a_stage_took_back_is_read_again_when_it_is_confirmed_again() -> None:
+    session = Session("opening", (*PLANNED, "patella"), {"patella": READ})
+    session.enter("patella")
+    session.submit(ConfirmStep("patella"))
+    assert WithdrawStep("patella") in session.enter("implant")
+    session.enter("patella")
+    session.sent.clear()
+    session.submit(ConfirmStep("patella"))
+    assert ReadThickness("patella", READ) in session.sent
 
 
 @pytest.mark.parametrize("name", ["nose", "femur_posterior"])

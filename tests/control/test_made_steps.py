@@ -1,6 +1,7 @@
 """Steps are confirmed and withdrawn in a session, and the faces of cuts measured."""
 
 import threading
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -10,15 +11,17 @@ from navapp.control.command_files import command_from_json, command_to_json
 from navapp.control.commands import (
     ConfirmStep,
     EnterStage,
+    ReadThickness,
     Register,
     WithdrawStep,
 )
 from navapp.control.executors import ThreadExecutor
 from navapp.control.states import Snapshot
 from navapp.errors import UsageError
-from navapp.values import Status
+from navapp.values import BoneModel, Plan, ResectionPlane, Status, SurgicalContent
 from tests.control.cuts import Faces, cut_plan
-from tests.control.fakes import Bench, answer, navigating, wait_for
+from tests.control.fakes import Bench, a_frame, a_pose, answer, navigating, wait_for
+from tests.geometry.shapes import sphere
 
 
 @pytest.fixture
@@ -162,7 +165,85 @@ def test_a_cut_withdrawn_and_made_again_is_measured_again(bench: Bench, faces: F
     assert snapshot.steps[0].seen_share is None
 
 
-@pytest.mark.parametrize("command", [ConfirmStep("femur_distal"), WithdrawStep("femur_distal")])
+FLAT = ResectionPlane("patella", np.zeros(3), np.array([0.0, 0.0, 1.0]), (60.0, 60.0))
+
+
+def patella_plan() -> Plan:
+    """The ball of the plan's femur is a patella, cut through its middle."""
+    ball = BoneModel("patella", sphere(20.0, 40))
+    plan = cut_plan()
+    planes = {**plan.content.planes, "flat_patella": FLAT}
+    return replace(
+        plan,
+        bones={**plan.bones, "patella": ball},
+        content=SurgicalContent(planes=planes),
+        digest="",
+    )
+
+
+def test_a_thickness_that_was_read_makes_another_bone_of_the_patella() -> None:
+    bench = navigating(Bench(plan=patella_plan()))
+    bench.do(EnterStage(4))
+    snapshot = bench.do(ConfirmStep("flat_patella"))
+    assert snapshot.bone_version == 1
+    step = snapshot.steps[0]
+    planned_mm = [one.thickness_mm for one in step.caliper_points]
+    np.testing.assert_allclose(planned_mm, np.sqrt(20.0**2 - 10.0**2), rtol=0.02)
+    assert step.thickness is None
+    reading = tuple(one - 0.5 for one in planned_mm)
+    snapshot = bench.do(ReadThickness("flat_patella", reading))
+    assert snapshot.bone_version == 2
+    assert "thickness below flat_patella read" in bench.events[-1].text
+    step = snapshot.steps[0]
+    assert step.measured is None
+    assert step.thickness.mm == pytest.approx(20.5, abs=0.1)
+    assert step.thickness.planned_mm == pytest.approx(20.0, abs=0.1)
+    assert step.remaining_mm == reading
+    # A new registration takes nothing of it back; read again, it counts anew.
+    bench.do(Register())
+    bench.frames(3)
+    snapshot = bench.accept()
+    assert snapshot.bone_version == 2
+    assert snapshot.steps[0].remaining_mm == reading
+    snapshot = bench.do(ReadThickness("flat_patella", tuple(planned_mm)))
+    assert snapshot.bone_version == 3
+    assert snapshot.steps[0].is_caliper_readable
+    assert bench.do(WithdrawStep("flat_patella")).bone_version == 0
+
+
+@pytest.mark.parametrize(
+    ("command", "why"),
+    [
+        (ReadThickness("nose", (10.0,) * 4), "'nose' is no cut that was confirmed"),
+        (ReadThickness("flat_patella", (10.0,) * 4), "is no cut that was confirmed"),
+        (ReadThickness("top", (10.0,) * 4), "the femur is followed by its surface"),
+    ],
+)
+def test_a_thickness_that_says_nothing_is_refused(command, why: str) -> None:
+    bench = navigating(Bench(plan=patella_plan(), made_steps=("top",)))
+    bench.do(command)
+    assert why in bench.refused()
+
+
+@pytest.mark.parametrize("reading", [(10.0, 10.0), (30.0, 30.0, 10.0, 10.0)])
+def test_a_thickness_that_tells_no_face_is_refused(reading: tuple[float, ...]) -> None:
+    bench = navigating(Bench(plan=patella_plan()))
+    bench.do(EnterStage(4))
+    bench.do(ConfirmStep("flat_patella"))
+    snapshot = bench.do(ReadThickness("flat_patella", reading))
+    assert "thickness" in bench.refused()
+    assert snapshot.bone_version == 1
+    assert snapshot.steps[0].thickness is None
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ConfirmStep("femur_distal"),
+        WithdrawStep("femur_distal"),
+        ReadThickness("patella", (13.5, 13.25, 12.0, 14.0)),
+    ],
+)
 def test_commands_are_recorded(command) -> None:
     assert command_from_json(command_to_json(command)) == command
 
@@ -178,6 +259,21 @@ def test_a_session_can_begin_with_cuts_made() -> None:
     vertices_mm = cut_plan().bones["femur"].mesh.vertices_mm
     is_left = (vertices_mm[:, 2] <= 6.5) & (vertices_mm[:, 0] <= 23.5)
     np.testing.assert_array_equal(used_by_tracker(bench), is_left)
+
+
+@pytest.mark.parametrize(("skew_ns", "is_measured"), [(0, True), (4_000_000, False)])
+def test_a_bone_that_moves_is_measured_only_in_pictures_that_are_exposed_at_once(
+    bench: Bench, faces: Faces, skew_ns: int, is_measured: bool
+) -> None:
+    faces.shares["top"] = 0.8
+    bench.do(ConfirmStep("top"))
+    steps, frame = bench.controller._session._steps, replace(a_frame(), skew_ns=skew_ns)
+    found = {}
+    for k in range(3):
+        pose = a_pose().move((0.8 * k, 0, 0, 0, 0, 0), np.zeros(3))
+        at = replace(frame, captured_ns=frame.captured_ns + k * 33_000_000, sequence=k)
+        found |= steps.measure(at, answer(pose=pose), is_accepted=True)
+    assert ("top" in found) == is_measured
 
 
 def test_a_new_registration_forgets_what_was_measured_with_the_old_one(

@@ -21,6 +21,7 @@ from navapp.control.commands import (
     OverrideGate,
     Propose,
     Quit,
+    ReadThickness,
     Reconnect,
     Register,
     Reject,
@@ -69,6 +70,7 @@ def any_command(rng: np.random.Generator, snapshot: Snapshot) -> Command:
         CheckMirror(), NudgeCross(1, 0), ConfirmCross(), EnterStage(number),
         OverrideGate(snapshot.gate_stage, "a test"), OverrideGate(number, " "),
         WithdrawCondition(name), ConfirmStep("top"), WithdrawStep("top"), ConfirmStep("nose"),
+        ReadThickness("top", (10.0,) * 4), ReadThickness("nose", ()),
         Reconnect(), SetProjector("on"), SetProjector("colour"), Interrupt(),
     )  # fmt: skip
     rare: tuple[Command, ...] = (DistrustRig("the board looks longer"), Quit())

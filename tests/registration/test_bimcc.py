@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from navapp.geometry.transform import RigidTransform, rotation_from_vector, vector_from_rotation
-from navapp.registration import RegistrationModel, Scene, estimate_at, fit_bimcc
+from navapp.registration import RegistrationModel, Scene, fit_bimcc, solution_at
 from navapp.registration.bimcc import fit_coarsely, fit_pose
 from navapp.registration.bimcc_kernels import BimccSettings
 from navapp.values import BoneModel, PoseEstimate, Reason
@@ -83,10 +83,10 @@ def test_points_on_the_far_side_do_not_pair() -> None:
     normals = TRUE.rotate(BONE.mesh.normals)
     hidden = (normals * back).sum(axis=1) > 0.3 * np.linalg.norm(back, axis=1)
     points = back[hidden][::5]
-    found = estimate_at(Scene(points, EYE), MODEL, TRUE)
+    found = solution_at(Scene(points, EYE), MODEL, TRUE).estimate
     assert Reason.TOO_FEW_POINTS in found.reasons
     # Who does not say where it was seen from is taken at his word.
-    assert Reason.TOO_FEW_POINTS not in estimate_at(Scene(points), MODEL, TRUE).reasons
+    assert Reason.TOO_FEW_POINTS not in solution_at(Scene(points), MODEL, TRUE).estimate.reasons
 
 
 def test_parts_that_were_cut_away_pair_with_nothing() -> None:
@@ -95,7 +95,7 @@ def test_parts_that_were_cut_away_pair_with_nothing() -> None:
     removed = seen_vertices(BONE)[gone[seen_vertices(BONE)]]
     scene = Scene(TRUE.apply(BONE.mesh.vertices_mm[removed]), EYE)
     assert len(scene) > 500
-    found = estimate_at(scene, cut, TRUE)
+    found = solution_at(scene, cut, TRUE).estimate
     assert found.n_points < 0.05 * len(scene)
 
 
@@ -104,7 +104,7 @@ def test_points_beyond_an_open_border_pair_with_nothing() -> None:
     pose = RigidTransform.from_parts("left_rect", "plate", np.eye(3), (0.0, 0.0, 400.0))
     y = np.linspace(20.5, 24.0, 100)
     beyond = np.column_stack([np.zeros(100), y, np.zeros(100)])
-    found = estimate_at(Scene(pose.apply(beyond)), model, pose)
+    found = solution_at(Scene(pose.apply(beyond)), model, pose).estimate
     assert Reason.TOO_FEW_POINTS in found.reasons
 
 
@@ -128,12 +128,12 @@ def test_a_surface_that_leaves_a_direction_free_is_degenerate(name: str, mesh) -
 
 
 def test_a_bone_is_not_degenerate() -> None:
-    assert estimate_at(scene_of(seen_cloud(BONE, 900, 0.2)), MODEL, TRUE).reasons == ()
+    assert solution_at(scene_of(seen_cloud(BONE, 900, 0.2)), MODEL, TRUE).estimate.reasons == ()
 
 
 def test_estimating_at_a_pose_does_not_move_it() -> None:
     pose = disturbed(MODEL, 1.0, 0.5, 3)
-    found = estimate_at(scene_of(seen_cloud(BONE, 900, 0.2)), MODEL, pose)
+    found = solution_at(scene_of(seen_cloud(BONE, 900, 0.2)), MODEL, pose).estimate
     assert found.camera_from_bone is pose
     assert found.iterations == 0
 
@@ -258,14 +258,14 @@ def test_known_noise_is_taken_at_its_word() -> None:
 
     def told(sigma_mm: float) -> PoseEstimate:
         sigma = np.full(len(cloud), sigma_mm)
-        return estimate_at(Scene(cloud.points_mm, EYE, sigma), MODEL, TRUE)
+        return solution_at(Scene(cloud.points_mm, EYE, sigma), MODEL, TRUE).estimate
 
     small, large = told(2.0), told(4.0)
     ratio = np.diag(large.covariance) / np.diag(small.covariance)
     np.testing.assert_allclose(ratio, 4.0, rtol=0.05)
     assert small.rms_mm < 0.3
     assert 1.0 < small.expected_rms_mm < 2.0
-    unknown = estimate_at(Scene(cloud.points_mm, EYE), MODEL, TRUE)
+    unknown = solution_at(Scene(cloud.points_mm, EYE), MODEL, TRUE).estimate
     assert unknown.expected_rms_mm < 0.2
     assert np.diag(unknown.covariance).max() < 0.1 * np.diag(small.covariance).max()
 
@@ -273,14 +273,14 @@ def test_known_noise_is_taken_at_its_word() -> None:
 @pytest.mark.parametrize("sigma_mm", [1.0, 2.0])
 def test_points_take_part_as_far_off_as_their_own_noise_lets_expect(sigma_mm: float) -> None:
     cloud = seen_cloud(BONE, 900, sigma_mm, 3)
-    found = estimate_at(scene_of(cloud), MODEL, TRUE)
+    found = solution_at(scene_of(cloud), MODEL, TRUE).estimate
     assert found.n_points > 0.95 * len(cloud)
 
 
 def test_neighbouring_points_within_the_correlation_count_as_one() -> None:
     cloud = replace(seen_cloud(BONE, 900, 0.3), stride_px=3)
-    alone = estimate_at(Scene.from_stereo(cloud, 1.0), MODEL, TRUE).covariance
-    shared = estimate_at(Scene.from_stereo(cloud, 12.0), MODEL, TRUE).covariance
+    alone = solution_at(Scene.from_stereo(cloud, 1.0), MODEL, TRUE).estimate.covariance
+    shared = solution_at(Scene.from_stereo(cloud, 12.0), MODEL, TRUE).estimate.covariance
     np.testing.assert_allclose(shared, 16.0 * alone, rtol=1e-9)
 
 
@@ -295,5 +295,5 @@ def test_cartilage_is_fitted_where_it_lies_and_widens_the_answer() -> None:
     found = fit_bimcc(scene, coated, disturbed(MODEL, 4.0, 3.0, 1))
     assert mean_error_mm(found.camera_from_bone, BONE) < 0.05
     sure = RegistrationModel(replace(BONE, cartilage_mm=np.full(n, 2.0)))
-    certain = estimate_at(scene, sure, TRUE).covariance
+    certain = solution_at(scene, sure, TRUE).estimate.covariance
     assert np.trace(found.covariance) > 4.0 * np.trace(certain)

@@ -9,7 +9,7 @@ from navapp.geometry.transform import RigidTransform, rotation_angle_deg, rotati
 from navapp.registration import (
     RegistrationModel,
     Scene,
-    estimate_at,
+    solution_at,
     solve_bimcc_literal,
     solve_icp,
 )
@@ -238,6 +238,6 @@ def test_too_few_points_say_so(solve, n: int) -> None:
 def test_the_figures_are_those_of_every_other_solver(solve) -> None:
     scene = Scene(SAMPLES + np.random.default_rng(1).normal(0.0, 0.2, SAMPLES.shape))
     found = solve(scene, BLOB, FRAMES).estimate
-    same = estimate_at(scene, BLOB, found.camera_from_bone)
+    same = solution_at(scene, BLOB, found.camera_from_bone).estimate
     np.testing.assert_allclose(found.covariance, same.covariance)
     assert (found.rms_mm, found.n_points) == (same.rms_mm, same.n_points)

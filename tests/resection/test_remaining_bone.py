@@ -1,5 +1,7 @@
 """What is left of a bone after cuts."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,7 @@ from navapp.geometry.mesh import TriangleMesh, join_meshes
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from navapp.registration import RegistrationModel
 from navapp.resection.cut_bone import SURE_MM, UNSURE_MM, CutBone
-from navapp.resection.remaining_bone import Cut, remove_cuts, remove_holes
+from navapp.resection.remaining_bone import Cut, close_with_face, remove_cuts, remove_holes
 from navapp.values import BoneModel, DrillAxis, MeasuredFace, ResectionPlane
 from tests.registration.shapes import GEOMETRY
 from tests.resection.cuts import MADE, PLANNED, bone
@@ -112,6 +114,59 @@ def test_a_cut_that_is_withdrawn_gives_the_bone_back() -> None:
 def test_a_cut_made_again_is_not_measured() -> None:
     once = CutBone(bone()).make("top", PLANNED).with_faces({"top": face()})
     assert once.make("top", PLANNED).unmeasured == ("top",)
+
+
+def test_a_read_face_closes_the_bone_and_is_matched() -> None:
+    cut = CutBone(bone()).make("top", PLANNED)
+    known = cut.with_caliper_face("top", face())
+    model = known.model
+    assert model.face is not None
+    assert model.face.offset_mm == -0.7
+    assert model.lid is None
+    assert not model.is_removed.any()
+    assert model.mesh.vertices_mm[:, 2].max() == pytest.approx(11.3)
+    above = RigidTransform.from_parts(
+        "left_rect", "femur", rotation_from_vector((np.pi, 0.0, 0.0)), (0.0, 0.0, 450.0)
+    )
+    box = Box(0, 0, GEOMETRY.width, GEOMETRY.height)
+    seen = RegistrationModel(model).render(above, GEOMETRY, box)
+    middle = round(GEOMETRY.centre_y_px), round(GEOMETRY.centre_x_px)
+    assert seen.depth_mm[middle] == pytest.approx(450.0 - 11.3, abs=0.01)
+    assert known.unmeasured == ()
+    assert known.version == model.version == 2
+
+
+def test_a_read_face_lasts_until_its_cut_is_withdrawn_or_made_again() -> None:
+    known = CutBone(bone()).make("top", PLANNED).with_caliper_face("top", face())
+    assert known.without_faces().caliper_faces == known.caliper_faces
+    assert known.make("side", MADE).caliper_faces == known.caliper_faces
+    for other in (known.restore("top"), known.make("top", PLANNED)):
+        assert not other.caliper_faces
+        assert other.model.face is None
+    assert known.restore("top").version == 0
+
+
+def test_a_read_bone_keeps_what_its_cartilage_leaves_open() -> None:
+    sd_mm = np.linspace(0.1, 0.4, len(bone().mesh.vertices_mm))
+    thick = replace(bone(), cartilage_mm=np.full(len(sd_mm), 2.0), cartilage_sd_mm=sd_mm)
+    closed = close_with_face(thick, face())
+    lowest = closed.mesh.vertices_mm[:, 2].argmin()
+    assert closed.mesh.vertices_mm[lowest, 2] == pytest.approx(-32.0, abs=0.1)
+    assert not closed.cartilage_mm.any()
+    # The face itself is sawn.
+    is_on_face = np.abs(closed.mesh.vertices_mm[:, 2] - 11.3) < 1e-6
+    assert not closed.cartilage_sd_mm[is_on_face].any()
+    on_skin_mm = closed.cartilage_sd_mm[~is_on_face]
+    assert 0.1 <= on_skin_mm.min() < on_skin_mm.max() <= 0.4
+
+
+def test_other_cuts_and_holes_of_a_read_bone_are_gone_as_well() -> None:
+    side = ResectionPlane("femur", np.array([12.0, 0.0, 0.0]), np.array([1.0, 0.0, 0.0]))
+    known = CutBone(bone()).make("top", PLANNED).with_caliper_face("top", face())
+    both = known.make("side", side).model
+    assert both.face is known.model.face
+    assert not known.model.is_removed.any()
+    np.testing.assert_array_equal(both.is_removed, both.mesh.vertices_mm[:, 0] > 12.0 - UNSURE_MM)
 
 
 def test_the_surface_that_is_looked_at_ends_at_the_faces() -> None:

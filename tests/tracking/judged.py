@@ -9,7 +9,7 @@ from navapp.geometry.rig import RigQuality
 from navapp.geometry.transform import RigidTransform
 from navapp.registration import RegistrationModel, Scene
 from navapp.registration.verdict import Agreement
-from navapp.stereo import PictureHealth, StereoHealth
+from navapp.stereo.health import PictureHealth, StereoHealth
 from navapp.tracking import Goal, TrackerSettings
 from navapp.tracking.checks import PairCheck, PairChecks
 from navapp.tracking.frame import Fit, Frame

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from navapp.geometry.rig import RigQuality
-from navapp.registration import estimate_at
+from navapp.registration import solution_at
 from navapp.tracking import TrackState
 from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.tracking.first_registration import FirstRegistration
@@ -373,11 +373,29 @@ def test_a_frame_that_is_begun_again_keeps_what_was_predicted() -> None:
         )
     )  # fmt: skip
     answer = tracker._follow(first, state, GOAL)
-    tracker._follow_closer(replace(first, times=times), answer, state, GOAL)
+    tracker.follow_closer(
+        replace(first, times=times), answer, lambda again: tracker._follow(again, state, GOAL)
+    )
     away = a.truth(a.frames[0]).move((4.0, 0, 0, 0, 0, 0), (0.0, 0.0, 0.0))
     tracker._search_places(first, [away], 0, GOAL, tracker.judge.lost_in(first))
     assert len(begun) == 3
     assert all(one.predicted is first.predicted for one in begun[1:])
+
+
+def test_the_answer_with_the_motion_that_the_pose_shows_counts_even_when_it_is_worse() -> None:
+    a = room()
+    tracker = BimccTracker(a.rig, a.tracker.model.bone)
+    state = TrackState.at_rest(a.truth(a.frames[0]), 0)
+    frame = replace(a.frames[0], captured_ns=33_000_000)
+    first = tracker.begin_predicted(frame, state)
+    answer = tracker._follow(first, state, GOAL)
+    assert answer.verdict.status is Status.OK
+    lost = tracker.judge.lost_in(first)
+    for other, is_kept in ((None, True), (RowTimes.of_pair, False)):
+        found = other and other(tracker.meter, state, replace(frame, skew_ns=1))
+        times = SimpleNamespace(with_motion_to=lambda pose, found=found: found)
+        closer = tracker.follow_closer(replace(first, times=times), answer, lambda again: lost)
+        assert closer is (answer if is_kept else lost)
 
 
 def test_candidates_that_share_a_free_measurement_are_checked_each_at_its_own_pose() -> None:
@@ -391,7 +409,7 @@ def test_candidates_that_share_a_free_measurement_are_checked_each_at_its_own_po
     measured = tracker.meter.measure_freely(view.pair, view.start, WIDE_BOX)
     away = view.start.move((0.0, 0.0, 25.0, 0.2, 0.0, 0.0), view.start.translation_mm)
     fits = [
-        Fit(estimate_at(measured.scene, tracker.model, pose, FREE_SETTINGS), measured)
+        Fit(solution_at(measured.scene, tracker.model, pose, FREE_SETTINGS).estimate, measured)
         for pose in (view.start, away)
     ]
     FirstRegistration(tracker)._judge_distinct(view, fits, GOAL)

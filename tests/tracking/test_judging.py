@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from navapp.geometry.rig import RigQuality
-from navapp.registration import RegistrationModel, estimate_at, fit_bimcc
+from navapp.registration import RegistrationModel, fit_bimcc, solution_at
 from navapp.registration.verdict import OK_ERROR_MM
 from navapp.tracking import Goal, TrackerSettings
 from navapp.tracking.agreement import compare
@@ -30,7 +30,7 @@ from tests.tracking.rooms import measured_map
 
 
 def estimate_on(measured: DisparityMap = MAP, model=MODEL, pose=TRUE) -> PoseEstimate:
-    return estimate_at(scene_of(measured), model, pose, FREE_SETTINGS)
+    return solution_at(scene_of(measured), model, pose, FREE_SETTINGS).estimate
 
 
 def verdict_on(

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from navapp.geometry.mesh import TriangleMesh
-from navapp.registration import RegistrationModel, estimate_at
+from navapp.registration import RegistrationModel, solution_at
 from navapp.tracking import TrackerSettings, TrackState, judging
 from navapp.tracking.agreement import compare
 from navapp.tracking.bimcc_tracker import BimccTracker
@@ -59,7 +59,7 @@ def test_the_covariance_turns_with_the_camera_frame() -> None:
     estimate = tracker.assess(frame, truth, GOAL).estimate
     begun = tracker.begin(frame, truth, WIDE_VIEW)
     measured = tracker.meter.measure_freely(begun.pair, begun.start, NEAR_BOX)
-    inside = estimate_at(measured.scene, tracker.model, begun.start, FREE_SETTINGS)
+    inside = solution_at(measured.scene, tracker.model, begun.start, FREE_SETTINGS).estimate
     turn = np.kron(np.eye(2), tracker.meter.geometry.rectified_from_left.rotation)
     np.testing.assert_allclose(
         turn @ estimate.covariance @ turn.T, inside.covariance, rtol=1e-9, atol=1e-15

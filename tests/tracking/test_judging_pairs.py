@@ -7,8 +7,8 @@ import pytest
 
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
-from navapp.registration import estimate_at
-from navapp.stereo import PictureHealth, StereoHealth
+from navapp.registration import solution_at
+from navapp.stereo.health import PictureHealth, StereoHealth
 from navapp.tracking import Goal, TrackState
 from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.tracking.frame import FREE_SETTINGS
@@ -26,7 +26,7 @@ LIMIT_PX = 0.5 * GEOMETRY.focal_px * GEOMETRY.baseline_mm / DEPTH_MM**2
 
 def judged_right(health: StereoHealth, tolerance_mm: float = 9.0):
     """Of a right pose, in a pair of that health."""
-    estimate = estimate_at(scene_of(MAP), MODEL, TRUE, FREE_SETTINGS)
+    estimate = solution_at(scene_of(MAP), MODEL, TRUE, FREE_SETTINGS).estimate
     return judged(estimate, goal=Goal(NO_TARGETS, tolerance_mm), health=health)
 
 

@@ -6,13 +6,15 @@ from typing import Any
 import numpy as np
 import pytest
 from textual.pilot import Pilot
+from textual.widgets import Static
 
-from navapp.control.commands import ConfirmStep, WithdrawStep
+from navapp.control.commands import ConfirmStep, ReadThickness, WithdrawStep
 from navapp.control.stages import STAGES
 from navapp.control.states import StepLine
-from navapp.resection import Thickness
+from navapp.resection import CaliperPoint, Thickness
 from navapp.ui.actions import ACTIONS
 from navapp.ui.steps_page import STEP_KEYS, StepsPage, StepTable
+from navapp.ui.thickness_question import ThicknessQuestion
 from navapp.values import MeasuredFace, ResectionPlane
 from tests.ui import snapshots
 from tests.ui.test_app import BellCounter, play
@@ -74,6 +76,58 @@ def test_steps_are_told_and_changed_by_their_letters(size: tuple[int, int]) -> N
         ConfirmStep("femur_anterior_chamfer"),
         WithdrawStep("femoral_implant"),
     ]
+
+
+CALIPER_POINTS = tuple(
+    CaliperPoint(name, np.zeros(2), thickness_mm, 0.2)
+    for name, thickness_mm in (("medial", 13.5), ("lateral", 13.8), ("distal", 13.6))
+)
+PATELLA = StepLine("patella", "cut", is_made=True, caliper_points=CALIPER_POINTS)
+
+
+@pytest.mark.parametrize("size", [(80, 24), (160, 48)])
+def test_a_thickness_is_asked_for_and_typed(size: tuple[int, int]) -> None:
+    async def script(app: BellCounter, pilot: Pilot[Any]) -> None:
+        await pilot.press("k")
+        text = app.text_of(StepTable)
+        assert "not tracked until its remaining thickness is read (r), in mm" in text
+        assert "remaining as planned: medial 13.5, lateral 13.8, distal 13.6" in text
+        await pilot.press("r", *"13.4,14", "enter")
+        assert isinstance(app.screen, ThicknessQuestion)
+        told = app.screen.query_one("#thickness-hint", Static)
+        assert str(told.content) == "3 numbers are needed, with commas between them"
+        await pilot.press(*",12..9", "enter")
+        assert isinstance(app.screen, ThicknessQuestion)
+        await pilot.press("backspace", "backspace", "9", "enter")
+        assert isinstance(app.screen, StepsPage)
+        await pilot.press("r", *"1,2,3", "escape")
+        assert isinstance(app.screen, StepsPage)
+
+    given = snapshots.navigating(steps=(PATELLA,), stage=STAGES[3])
+    app = play(given, script, size)
+    assert app.session.commands == [ReadThickness("patella", (13.4, 14.0, 12.9))]
+
+
+def test_a_thickness_that_was_read_is_told() -> None:
+    async def script(app: BellCounter, pilot: Pilot[Any]) -> None:
+        await pilot.press("k")
+        lines = [line.strip() for line in app.text_of(StepTable).splitlines()]
+        assert lines[1] == "remaining as read (r: again): medial 13.2, lateral 14.0, distal 13.1"
+        assert lines[2] == "remaining as planned: medial 13.5, lateral 13.8, distal 13.6"
+        assert lines[3] == "removed 8.80 mm +-0.30, planned 9.00"
+
+    read = replace(PATELLA, thickness=Thickness(9.0, 8.8, 0.3), remaining_mm=(13.2, 14.0, 13.1))
+    play(snapshots.navigating(steps=(read,), stage=STAGES[3]), script, (80, 24))
+
+
+def test_no_thickness_is_asked_for_before_the_cut_is_made() -> None:
+    async def script(app: BellCounter, pilot: Pilot[Any]) -> None:
+        await pilot.press("k", "r")
+        assert isinstance(app.screen, StepsPage)
+        assert app.n_bells == 1
+
+    steps = (replace(PATELLA, is_made=False), *STEPS)
+    play(snapshots.navigating(steps=steps, stage=STAGES[3]), script, (80, 24))
 
 
 def test_steps_for_which_there_is_no_letter_are_told() -> None:

@@ -5,8 +5,9 @@ beside the bone, or not at all, and too little of a small bone is left to be bel
 pictures tell what is mirrored from what comes out of the bone (`stereo/matte_pictures.py`).
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +39,8 @@ _MATTE_ALONE, _GREY_ALONE = np.float32(1.5), np.float32(2.0)
 _LEAST_CONTRADICTION, _LEAST_ANSWERED = 0.75, 1.08
 _MAD_TO_SIGMA = 1.4826
 
+MeasureMatte = Callable[[Expected], Measurement | None]
+
 
 class HighlightSearch:
     """Follows one bone onto what is measured of it without highlights."""
@@ -48,40 +51,51 @@ class HighlightSearch:
     def find(self, frame: Frame, pose: RigidTransform) -> Iterator[Fit]:
         """The fit at which the bone rests near a pose (rectified left camera from bone).
 
-        None where no highlights are seen: in grey pictures, without colour, on a matt bone.
+        Nothing where no highlights are seen: in grey pictures, without colour, on a matt bone.
         """
-        region = self._meter.find_region(pose, NEAR_VIEW)
-        expected = self._meter.render(frame.pair, pose, NEAR_BOX)
-        left, right, times = frame.pictures.left, frame.pictures.right, frame.times
-        if left.ndim == 2 or region is None or expected is None:
+        begun = self._begin(frame, pose)
+        if begun is None:
             return
-        shifts_px = None if times is None else times.find_shifts(frame.start)
-        coloured = self._meter.rectifier.rectify(left, right, *region, row_shifts_px=shifts_px)
-        matte = make_matte_pair(
-            replace(coloured, box=expected.pair.box), np.isfinite(expected.support_px)
-        )
-        if matte is None:
-            return
-        # What was filled was not measured.
-        is_filled = find_near_clipped(coloured.left, RESAMPLED_REACH_PX)
-        first = self._measure_matte(expected, matte, is_filled)
-        if first is None:
-            return
+        first, measure_matte = begun
         # The follower begins where this was measured.
-        begun = iter([first])
-        found: Measurement | None = None
+        firsts, found = iter([first]), None
 
         def measure(expected: Expected) -> Measurement:
             nonlocal found
-            found = next(begun, None) or self._measure_matte(expected, matte, is_filled)
+            found = next(firsts, None) or measure_matte(expected)
             return found or self._meter.measure_on_model(expected)
 
         fit = Follower(self._meter, measure=measure).follow(frame, pose, skips_samples=True)
         if fit is not None and fit.measured is found:
             yield fit
 
+    def measure(self, frame: Frame, pose: RigidTransform) -> Measurement | None:
+        """The surface at a pose, as `find` measures it; None where no highlights are seen."""
+        begun = self._begin(frame, pose)
+        return None if begun is None else begun[0]
+
+    def _begin(self, frame: Frame, pose: RigidTransform) -> tuple[Measurement, MeasureMatte] | None:
+        """What is measured at a pose, and what measures so nearby; None without highlights."""
+        region = self._meter.find_region(pose, NEAR_VIEW)
+        expected = self._meter.render(frame.pair, pose, NEAR_BOX)
+        left, right, times = frame.pictures.left, frame.pictures.right, frame.times
+        if left.ndim == 2 or region is None or expected is None:
+            return None
+        shifts_px = None if times is None else times.find_shifts(frame.start)
+        coloured = self._meter.rectifier.rectify(left, right, *region, row_shifts_px=shifts_px)
+        matte = make_matte_pair(
+            replace(coloured, box=expected.pair.box), np.isfinite(expected.support_px)
+        )
+        if matte is None:
+            return None
+        # What was filled was not measured.
+        is_filled = find_near_clipped(coloured.left, RESAMPLED_REACH_PX)
+        measure_matte = partial(self._measure_matte, matte, is_filled)
+        first = measure_matte(expected)
+        return None if first is None else (first, measure_matte)
+
     def _measure_matte(
-        self, expected: Expected, matte: RectifiedPair, is_filled: NDArray[np.bool_]
+        self, matte: RectifiedPair, is_filled: NDArray[np.bool_], expected: Expected
     ) -> Measurement | None:
         """With what pictures without highlights say; None where these say nothing else."""
         support_px, box = expected.support_px, expected.pair.box
