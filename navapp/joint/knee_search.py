@@ -7,6 +7,7 @@ judged like any other pose.
 from typing import NamedTuple
 
 import numpy as np
+from scipy.special import stdtrit
 
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.joint.occluded_tracker import OccludedTracker
@@ -17,6 +18,7 @@ from navapp.registration.verdict import Goal
 from navapp.stereo import match_surface
 from navapp.tracking.frame import Fit, Frame, ignore
 from navapp.values import Reason, StereoPictures, Stopwatch, TrackedFrame
+from navapp.values.faces import SIZE_95
 from navapp.values.progress import Progress
 
 # Chosen: so many places are stepped from.
@@ -85,4 +87,9 @@ def _measure_spread(fits: list[Fit], best: Fit, centre_mm: FloatArray) -> FloatA
             if fit.pose is not best.pose and is_same_pose(fit.pose, best.pose, centre_mm)
         ]
     ).reshape(-1, 6)
-    return np.asarray(twists.T @ twists / max(len(twists), 1))
+    n = len(twists)
+    if n == 0:
+        return np.zeros((6, 6))
+    # So few places tell a deviation only roughly: 95 % lie within it times Student's t.
+    widening = float(stdtrit(n, 0.975)) / SIZE_95
+    return np.asarray(widening**2 * twists.T @ twists / n)

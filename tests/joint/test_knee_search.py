@@ -1,11 +1,15 @@
 """A simulated tibia found from its femur alone."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from navapp.evaluation import compute_mean_tre_mm
 from navapp.geometry.mesh import TriangleMesh
+from navapp.geometry.transform import RigidTransform
 from navapp.joint import KneeSearch, OccludedTracker
+from navapp.joint.knee_search import _measure_spread
 from navapp.limb import Hinge
 from navapp.tracking import Goal, make_tracker
 from navapp.values import BoneModel, Reason, Status
@@ -57,3 +61,21 @@ def test_a_tibia_is_found_from_the_femur_and_a_search_can_be_stopped(
 
     with pytest.raises(StopError):
         search.find(hidden, frame, true["femur"], GOAL, stop)
+
+
+@pytest.mark.parametrize(("n", "times"), [(1, 6.48), (4, 1.416), (9, 1.154)])
+def test_few_places_tell_a_spread_only_roughly(n: int, times: float) -> None:
+    """Student's t at 95 % over that of a normal distribution."""
+    centre_mm, best = np.zeros(3), fit_at(0.0)
+    beside = [fit_at(0.2 * (-1.0) ** k) for k in range(n)]
+    spread = _measure_spread([best, *beside, fit_at(30.0)], best, centre_mm)
+    assert np.sqrt(spread[0, 0]) == pytest.approx(0.2 * times, rel=0.01)
+    assert np.count_nonzero(spread) == 1
+    assert not _measure_spread([best, fit_at(30.0)], best, centre_mm).any()
+
+
+def fit_at(x_mm: float) -> SimpleNamespace:
+    place_mm = (x_mm, 0.0, 400.0)
+    return SimpleNamespace(
+        pose=RigidTransform.from_parts("left_rect", "tibia", np.eye(3), place_mm)
+    )
