@@ -57,6 +57,10 @@ class Campaign(Protocol[T]):
         """Those that are run once more, one after the other, for their times."""
         ...
 
+    def group(self, tests: Sequence[T]) -> list[tuple[T, ...]]:
+        """The tests in their order; those that share pictures are run in one process."""
+        ...
+
     def render(self, test: T, n_frames: int) -> KnownSequence:
         """The pictures of a test: so many that count, after the one that is registered in."""
         ...
@@ -183,10 +187,18 @@ def run_campaign(
     total = len(settings.tests) + len(timed)
     n_done = total - len(missing) - len(slow)
     for part, processes, is_timed in ((missing, n_processes, False), (slow, 1, True)):
-        run = partial(run_test, folder, settings, is_timed=is_timed)
-        for test in run_in_processes(run, part, processes):
-            n_done += 1
-            on_progress(n_done, total, test.name)
+        run = partial(run_tests, folder, settings, is_timed=is_timed)
+        for tests in run_in_processes(run, settings.group(part), processes):
+            n_done += len(tests)
+            on_progress(n_done, total, tests[-1].name)
+
+
+def run_tests(
+    folder: CampaignFolder[T], settings: Campaign[T], tests: Sequence[T], *, is_timed: bool
+) -> None:
+    """Run tests one after the other."""
+    for test in tests:
+        run_test(folder, settings, test, is_timed=is_timed)
 
 
 def run_test(folder: CampaignFolder[T], settings: Campaign[T], test: T, *, is_timed: bool) -> None:

@@ -1,5 +1,6 @@
 """What is run for an ablation: our method whole, and without one part at a time."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -43,6 +44,10 @@ class AblationSettings:
     def timed_tests(self) -> tuple[CaseTest, ...]:
         """As for the tables: the first of each case; none for a quick look."""
         return self.knees.timed_tests
+
+    def group(self, tests: Sequence[CaseTest]) -> list[tuple[CaseTest, ...]]:
+        """Each has pictures of its own."""
+        return [(test,) for test in tests]
 
     def count_frames(self, test: CaseTest) -> int:
         """As for the tables: a test with an instrument lasts until that has passed once."""

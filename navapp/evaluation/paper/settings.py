@@ -1,6 +1,6 @@
 """What is run for the paper's tables."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, cast
 
@@ -66,6 +66,10 @@ class TableSettings:
     def timed_tests(self) -> tuple[CaseTest, ...]:
         """The first of each case; none for a quick look, whose times are those of its tests."""
         return () if self.is_quick else self.tests[:: self.n_tests]
+
+    def group(self, tests: Sequence[CaseTest]) -> list[tuple[CaseTest, ...]]:
+        """Each has pictures of its own."""
+        return [(test,) for test in tests]
 
     def count_frames(self, test: CaseTest) -> int:
         """A test with an instrument lasts until that has passed once."""

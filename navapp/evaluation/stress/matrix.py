@@ -1,9 +1,9 @@
 """The tests of the stress matrix: every level of every axis, on some knees each."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
-from itertools import count, islice
+from itertools import count, groupby, islice
 from typing import Any
 
 from navapp import __version__
@@ -107,6 +107,10 @@ class StressSettings:
     def timed_tests(self) -> tuple[StressTest, ...]:
         """None: nothing is said of times."""
         return ()
+
+    def group(self, tests: Sequence[StressTest]) -> list[tuple[StressTest, ...]]:
+        """One knee's levels of a rig or a plan are seen in the same pictures."""
+        return [tuple(some) for _, some in groupby(tests, key=StressTest.configure)]
 
     def count_frames(self, test: StressTest) -> int:
         """The same of all."""

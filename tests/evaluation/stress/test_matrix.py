@@ -36,6 +36,14 @@ def test_knees_are_left_and_right_of_women_and_men() -> None:
     assert [one.sex for one in simulated] == ["male", "male", "female", "female"]
 
 
+def test_levels_that_are_seen_in_the_same_pictures_are_run_together() -> None:
+    groups = SETTINGS.group(SETTINGS.tests)
+    assert [test for group in groups for test in group] == list(SETTINGS.tests)
+    # A plan is shifted five times before each of two knees; blood is on the bone itself.
+    assert [len(group) for group in groups] == [5, 5] + 8 * [1]
+    assert [len(group) for group in SETTINGS.group(SETTINGS.tests[3:])] == [2, 5] + 8 * [1]
+
+
 def test_other_levels_are_another_matrix(monkeypatch) -> None:
     before = SETTINGS.to_json()
     changed = replace(AXES["blood"], levels=(0.0, 0.3))
