@@ -57,7 +57,7 @@ tutorial: setup  ## four steps on simulated devices: room, calibration, plan, na
 window: setup   ## the application, with its picture in a window of the desktop
 	@$(BIN)/navapp run --window
 
-test: setup  ## style, types, import rules and the tests: about eight minutes
+test: setup  ## style, types, import rules and the tests: about four minutes
 	@$(MAKE) --no-print-directory -j2 --output-sync=line check bytecode kernels-if-changed tests
 
 test-all: setup check bytecode  ## the release gate: as test, with every case of every test
