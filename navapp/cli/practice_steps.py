@@ -43,7 +43,7 @@ class Caliper(Protocol):
 def read_thicknesses(
     plan: Plan, caliper: Caliper, names: Collection[str]
 ) -> dict[str, tuple[float, ...]]:
-    """What a person would read below those of the plan's cuts that need it, once they are made."""
+    """What a person would read (mm) below those of the plan's cuts that need it, once made."""
     read = {}
     for name in sorted(names):
         step = plan.content.steps[name]
@@ -57,6 +57,7 @@ def read_thicknesses(
         read_mm = caliper.read(name, points_mm, step.normal)
         # NaN where the jaws find no bone: a person reads nothing then.
         if np.isfinite(read_mm).all():
+            # A caliper shows hundredths.
             read[name] = tuple(round(float(one), 2) for one in read_mm)
     return read
 

@@ -217,7 +217,8 @@ class MadeSteps:
             return {}
         watch = self._rest_watches.get(tracked.bone)
         if watch is None:
-            watch = RestWatch(self._trackers.corners_mm(tracked.bone))
+            corners_mm = self._trackers.corners_mm(tracked.bone)
+            watch = RestWatch(corners_mm, self._trackers.row_delay_ns)
             self._rest_watches[tracked.bone] = watch
         if not watch.is_at_rest(frame, tracked.estimate.camera_from_bone) or rest:
             return {}

@@ -158,6 +158,11 @@ class Trackers:
         return corners
 
     @property
+    def row_delay_ns(self) -> int:
+        """Of the rig: each row is exposed later by this than the row above it."""
+        return self._rig.row_delay_ns
+
+    @property
     def follows_refused(self) -> bool:
         """Whether poses that the judge refuses are carried on."""
         return self._settings.follows_refused

@@ -179,7 +179,7 @@ def run_campaign(
         folder: takes the results.
         settings: what is run.
         n_processes: at a time; times are taken in a pass of their own, one at a time.
-        on_progress: told how many of how many are done, and which was the last.
+        on_progress: told after each group how many of how many are done, and which was the last.
     """
     timed = settings.timed_tests
     missing = folder.missing(settings.tests, is_timed=False)

@@ -16,7 +16,7 @@ from navapp.values import MeasuredFace
 # All chosen. The border is taken just below the face, on which the mesh has vertices, at points so
 # far from each other.
 _BELOW_MM, _SPACING_MM = 0.02, 0.3
-# Where so little of the bone is seen beyond the border, an edge may as well be that of the bone.
+# Where fewer px of the flank are seen beyond the border, the edge may be that of the flank.
 _STRIP_PX = 5
 
 
@@ -50,7 +50,7 @@ class FaceOutline(OutlineMeter):
             skin[tree.query(loop)[1]].astype(np.int32) for loop in self._loops_mm
         ]
 
-    def find_rim(
+    def find_seen_rim(
         self, pose: RigidTransform, eye: Eye, depth_mm: NDArray[np.float32], first: tuple[int, int]
     ) -> Rim:
         """The border as an eye sees it, without points beside which 1 to 4 px of flank are seen."""
@@ -63,7 +63,7 @@ class FaceOutline(OutlineMeter):
         ]
         rim = Rim(*(np.concatenate(parts) for parts in zip(*rims, strict=True)))
         strip_px = _measure_strip(rim, depth_mm, first)
-        is_clear = (strip_px == 0) | (strip_px == _STRIP_PX)
+        is_clear = (strip_px == 0) | (strip_px == _STRIP_PX)  # the count stops there
         thin: Rim = thin_rim(select_points(rim, is_clear))
         return thin
 

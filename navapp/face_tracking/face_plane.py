@@ -71,8 +71,11 @@ class FaceHeights:
         is_near = np.abs(height_mm) < _FURTHEST_MM
         if np.count_nonzero(is_near) < _FEWEST:
             return None
-        sigma_mm = roughness * cloud.sigma_ray_mm[is_near].astype(np.float64)
-        return cls(cloud.points_mm[is_near], height_mm[is_near], sigma_mm)
+        points_mm = cloud.points_mm[is_near]
+        # Errors lie along the rays.
+        cosine = np.abs(points_mm @ normal) / np.linalg.norm(points_mm, axis=1)
+        sigma_mm = roughness * cosine * cloud.sigma_ray_mm[is_near].astype(np.float64)
+        return cls(points_mm, height_mm[is_near], sigma_mm)
 
     def less(self, by_mm: FloatArray) -> "FaceHeights":
         """Over a face that lies so much higher at each point (N,)."""
@@ -92,6 +95,13 @@ class FaceHeights:
         rms_mm, claimed_mm = (
             float(np.sqrt(weight @ one**2)) for one in (self.height_mm, self.sigma_mm)
         )
-        share_near = float(np.mean(np.abs(self.height_mm) < 3.0 * self.sigma_mm))
-        n = len(self.height_mm)
-        return PoseEstimate(pose, covariance, n, share_near, rms_mm, claimed_mm, 1, True)
+        return PoseEstimate(
+            pose,
+            covariance,
+            n_points=len(self.height_mm),
+            inlier_fraction=float(np.mean(np.abs(self.height_mm) < 3.0 * self.sigma_mm)),
+            rms_mm=rms_mm,
+            expected_rms_mm=claimed_mm,
+            iterations=1,
+            is_converged=True,  # a search that does not rest says so
+        )

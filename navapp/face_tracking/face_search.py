@@ -91,10 +91,9 @@ class FaceSearch:
             joined = self._outline.join(frame.pair, fit, coarse_px, NOISE_VARIANCE_RATIO)
             # A few edges come and go with the pose: half steps end that.
             share = 1.0 if n_round < _WHOLE_STEPS else 0.5
+            moved_mm = pose.mean_motion_mm(joined.pose, meter.model.hull_mm)
             twist = share * pose.twist_to(joined.pose, meter.model.centre_mm)
-            moved = pose.move(twist, pose.apply(meter.model.centre_mm))
-            moved_mm = pose.mean_motion_mm(moved, meter.model.hull_mm)
-            pose = moved
+            pose = pose.move(twist, pose.apply(meter.model.centre_mm))
             fit = replace(fit, estimate=replace(estimate, camera_from_bone=pose))
             frame.watch.lap("estimate")
             if not is_sampled and moved_mm < _REST_MM:
@@ -131,10 +130,10 @@ class FaceSearch:
         if again is None:
             return fit.with_reason(Reason.NOT_CONVERGED)
         fixed, free = face_twists(self._face, pose, centre_mm)
-        # Divided, because the judge counts that share of a surface's noise: this is known as it is.
-        covariance = (fixed @ seen.covariance @ fixed.T) / NOISE_VARIANCE_RATIO
         window = free * np.array([_WINDOW_MM, _WINDOW_MM, _WINDOW_RAD])
-        covariance += window @ window.T
+        covariance = fixed @ seen.covariance @ fixed.T + window @ window.T
+        # The judge counts that share of a surface's noise: this is known as it is.
+        covariance /= NOISE_VARIANCE_RATIO
         estimate = replace(
             again, camera_from_bone=pose, covariance=covariance, reasons=fit.estimate.reasons
         )
@@ -180,8 +179,9 @@ class FaceSearch:
         normal = np.broadcast_to(pose.rotate(self._face.normal[None]), arm_mm.shape)
         rows = np.column_stack([normal, np.cross(arm_mm, normal)])
         n_sharing = measured.scene.n_sharing_errors
-        # As many points share an error: scaled like theirs, the window stays as wide as it is.
-        window = n_sharing * np.diag(np.repeat((_WINDOW_MM, _WINDOW_RAD), 3) ** -2.0)
+        # Below and by the judge the covariance is scaled by both: the window stays as it is.
+        scale = n_sharing * NOISE_VARIANCE_RATIO
+        window = scale * np.diag(np.repeat((_WINDOW_MM, _WINDOW_RAD), 3) ** -2.0)
         step, information = np.zeros(6), window
         for _ in range(_STEPS):
             weighted = rows.T * (heights.less(rows @ step).weight / heights.sigma_mm**2)

@@ -88,8 +88,8 @@ def _measure_spread(fits: list[Fit], best: Fit, centre_mm: FloatArray) -> FloatA
         ]
     ).reshape(-1, 6)
     n = len(twists)
-    if n == 0:
+    if n == 0:  # the fit's own covariance stands alone
         return np.zeros((6, 6))
-    # So few places tell a deviation only roughly: 95 % lie within it times Student's t.
+    # A deviation that is estimated from n places: the 95 % bound is Student's t times it.
     widening = float(stdtrit(n, 0.975)) / SIZE_95
     return np.asarray(widening**2 * twists.T @ twists / n)

@@ -157,7 +157,7 @@ def _make_point(
     corners_mm = plane.heights_mm(mesh.vertices_mm)[mesh.faces[is_below]]
     heights_mm = (spans[is_below] * corners_mm).sum(axis=1) / area[is_below]
     lowest = int(heights_mm.argmin())
-    # The slope of the triangle, by its corners' heights.
+    # The slope of the triangle, by its corners' heights; that of the made face adds little to it.
     corners = mesh.faces[is_below][lowest]
     rows = np.column_stack([flat_mm[corners], np.ones(3)])
     slope = np.linalg.solve(rows, corners_mm[lowest])[:2]

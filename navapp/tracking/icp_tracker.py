@@ -51,11 +51,12 @@ class IcpTracker(Tracker):
     is matched are paired.
 
     Attributes:
-        fills: occlusions are filled before the Gaussian filter.
-        n_among: the model's points are paired with the nearest of at least so many scene points.
+        fills_occlusions: before the Gaussian filter.
+        n_among: the model's points are paired among so many scene points at most, or among
+            `n_points` if that is more.
     """
 
-    fills = False
+    fills_occlusions = False
     n_among = 0
 
     def __init__(
@@ -117,7 +118,7 @@ class IcpTracker(Tracker):
         if region is None:
             return None
         box, band_px = region
-        answer = match_baseline(replace(frame.pair, box=box), band_px, fills=self.fills)
+        answer = match_baseline(replace(frame.pair, box=box), band_px, fills=self.fills_occlusions)
         frame.watch.add(answer.timings)
         return self.meter.take_surface(answer.disparity, max(self.n_points, self.n_among))
 

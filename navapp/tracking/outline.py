@@ -119,7 +119,7 @@ class OutlineMeter:
         def find_edges(
             picture: Image, eye: Eye, depth_mm: NDArray[np.float32], first_column: int
         ) -> tuple[FloatArray, ...]:
-            rim = self.find_rim(pose, eye, depth_mm, (first_column, view.box.y))
+            rim = self.find_seen_rim(pose, eye, depth_mm, (first_column, view.box.y))
             offset_px = measure_edge_offsets(picture, rim)
             is_found = np.isfinite(offset_px)
             rim, offset_px = select_points(rim, is_found), offset_px[is_found]
@@ -135,7 +135,7 @@ class OutlineMeter:
         )
         return ResidualBlock(jacobian, offset_px, variance, n_sharing, _COMMON_SD_PX, arm_mm)
 
-    def find_rim(
+    def find_seen_rim(
         self, pose: RigidTransform, eye: Eye, depth_mm: NDArray[np.float32], first: tuple[int, int]
     ) -> Rim:
         """What an eye should see of the outline.

@@ -21,7 +21,7 @@ class PaperTracker(IcpTracker):
     paper has it.
     """
 
-    fills = True
+    fills_occlusions = True
     n_among = 20_000  # chosen
 
     def estimate(self, frame: Frame, measured: Measurement, start: RigidTransform) -> PoseEstimate:

@@ -118,9 +118,9 @@ class Tracker(ABC):
     def follow_closer(
         self, frame: Frame, answer: TrackedFrame, follow: Callable[[Frame], TrackedFrame]
     ) -> TrackedFrame:
-        """Once more where the rows were exposed during another motion than was expected.
+        """Once more where a found pose shows another motion during the exposure than was expected.
 
-        That answer counts, whatever it is: the first one took a motion that is known to be wrong.
+        That answer of `follow` counts: the first one took a motion that is known to be wrong.
         """
         pose, verdict = answer.left_from_bone, answer.verdict
         is_doubted = is_place_doubted(verdict) or Reason.JUMPED in verdict.reasons

@@ -83,6 +83,31 @@ def run(path, settings=SETTINGS, told=None) -> CampaignFolder:
     return folder
 
 
+@dataclass(frozen=True)
+class Grouped(TableSettings):
+    """All tests share their pictures."""
+
+    def group(self, tests):
+        return [tuple(tests)] if tests else []
+
+
+def test_a_group_is_run_as_a_whole_and_gone_on_within(line: Line, tmp_path) -> None:
+    grouped, told = Grouped(ALL_CASES[:2], ("paper", "bimcc"), 2, 3, 1), []
+    line.is_killed_at = 5  # in the third test of four
+    with pytest.raises(KeyboardInterrupt):
+        run(tmp_path, grouped)
+    done = len(list((tmp_path / "tests").iterdir()))
+    assert done == 2
+    line.is_killed_at = None
+    run(tmp_path, grouped, told)
+    assert len(list((tmp_path / "tests").iterdir())) == 4
+    # Both groups at their ends: two tests that were left, and those for times.
+    n_timed = len(grouped.timed_tests)
+    assert [(n, of) for n, of, _ in told] == [(4, 4 + n_timed), (4 + n_timed, 4 + n_timed)]
+    seeds = [seed for seed, method in line.done if method == "bimcc"]
+    assert len(seeds) == 4 + n_timed + len(SETTINGS.methods) - 1
+
+
 def files_of(path) -> dict[str, bytes]:
     return {
         one.relative_to(path).as_posix(): one.read_bytes() for one in path.rglob("*")

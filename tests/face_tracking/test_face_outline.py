@@ -26,7 +26,7 @@ def test_it_is_the_border_of_the_face_seen_from_either_eye() -> None:
     )
     for x_mm in (0.0, GEOMETRY.baseline_mm):
         eye = Eye(x_mm, GEOMETRY.focal_px, GEOMETRY.centre_x_px, GEOMETRY.centre_y_px)
-        rim = outline.find_rim(pose, eye, np.empty((0, 0), dtype=np.float32), (0, 0))
+        rim = outline.find_seen_rim(pose, eye, np.empty((0, 0), dtype=np.float32), (0, 0))
         in_bone_mm = pose.inverse().apply(rim.point)
         assert np.abs(FACE.as_plane.heights_mm(in_bone_mm)).max() < 0.05
         np.testing.assert_allclose(np.linalg.norm(in_bone_mm, axis=1), 30.0, atol=0.1)
@@ -49,7 +49,7 @@ def test_where_a_narrow_strip_of_the_flank_is_seen_the_border_does_not_count() -
     eye = Eye(0.0, GEOMETRY.focal_px, GEOMETRY.centre_x_px, GEOMETRY.centre_y_px)
     shape = GEOMETRY.height, GEOMETRY.width
     nothing = np.full(shape, np.nan, dtype=np.float32)
-    border = outline.find_rim(pose, eye, nothing, (0, 0))
+    border = outline.find_seen_rim(pose, eye, nothing, (0, 0))
     assert len(border.pixel) > 50
     middle = border.pixel.mean(axis=0)
     radius_px = np.linalg.norm(border.pixel - middle, axis=1).mean()
@@ -58,5 +58,5 @@ def test_where_a_narrow_strip_of_the_flank_is_seen_the_border_does_not_count() -
     for strip_px, counts in ((-2.0, True), (3.0, False), (12.0, True)):
         depth_mm = np.where(away_px < strip_px, np.float32(440.0), np.float32(np.nan))
         # The buffer may begin elsewhere in the picture.
-        rim = outline.find_rim(pose, eye, depth_mm[5:, 7:], (7, 5))
+        rim = outline.find_seen_rim(pose, eye, depth_mm[5:, 7:], (7, 5))
         assert len(rim.pixel) == (len(border.pixel) if counts else 0)

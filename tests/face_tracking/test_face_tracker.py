@@ -1,6 +1,7 @@
 """A sawn patella is followed by its face."""
 
 from dataclasses import replace
+from itertools import cycle
 
 import numpy as np
 import pytest
@@ -100,6 +101,38 @@ def test_what_is_no_plane_does_not_fit(depth_mm) -> None:
     ratio = Fit(estimate, measured).variance_ratio / NOISE_VARIANCE_RATIO
     is_misfit = Reason.SURFACE_MISFIT in find_reasons(Evidence(correlated_ratio=ratio))
     assert is_misfit == (depth_mm > 0.0)
+
+
+class FakeOutline:
+    """Stands for the outline: it shifts the pose each time, or finds no edges."""
+
+    counts_all = False
+
+    def __init__(self, *shifts_mm: float) -> None:
+        self._shifts_mm = cycle(shifts_mm or (0.0,))
+
+    def join(self, pair, fit, coarse_px, noise_variance_ratio, **_):
+        twist = (next(self._shifts_mm), 0.0, 0.0, 0.0, 0.0, 0.0)
+        pose = fit.pose.move(twist, fit.pose.translation_mm)
+        moved = replace(fit.estimate, camera_from_bone=pose).scale_noise(noise_variance_ratio)
+        return replace(fit, estimate=moved)
+
+
+def test_without_a_border_a_plane_fixes_no_pose() -> None:
+    room, tracker = sawn_room(), sawn_room().tracker()
+    tracker.judge.outline = tracker._search._outline = FakeOutline()
+    for answer in followed(room, tracker):
+        assert answer.verdict.status is not Status.OK
+        # Of three numbers nothing is known but the window.
+        assert answer.verdict.predicted_tre_mm > 2.0
+
+
+@pytest.mark.parametrize(("shift_mm", "rests"), [(0.15, False), (0.01, True)])
+def test_what_goes_to_and_fro_has_not_settled(shift_mm: float, rests: bool) -> None:
+    room, tracker = sawn_room(), sawn_room().tracker()
+    tracker._search._outline = FakeOutline(shift_mm, -shift_mm)
+    answer = followed(room, tracker)[0]
+    assert (Reason.NOT_CONVERGED not in answer.verdict.reasons) == rests
 
 
 def test_a_pose_is_known_no_better_than_its_face() -> None:
