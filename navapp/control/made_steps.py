@@ -199,7 +199,7 @@ class MadeSteps:
             self._n_made[name],
             known.last,
             known.thickness,
-            self._caliper_points.get(name, ()),
+            *self._caliper_points.get(name, ((), "")),
             known.remaining_mm,
         )
 
@@ -264,10 +264,10 @@ class MadeSteps:
             self._trackers.set_bone(bone.with_faces(known))
 
 
-def _find_caliper_points(plan: Plan, step: PlannedStep) -> tuple[CaliperPoint, ...]:
-    """Where a caliper is read; empty where the plan allows no reading."""
+def _find_caliper_points(plan: Plan, step: PlannedStep) -> tuple[tuple[CaliperPoint, ...], str]:
+    """Where a caliper is read, or why the plan allows no reading."""
     try:
         cut = step if isinstance(step, ResectionPlane) else None
-        return () if cut is None else list_caliper_points(plan.bones[cut.bone], cut)
-    except UsageError:
-        return ()
+        return () if cut is None else list_caliper_points(plan.bones[cut.bone], cut), ""
+    except UsageError as error:
+        return (), str(error)

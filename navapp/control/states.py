@@ -168,9 +168,10 @@ class StepLine:
     last_measured: Measured | None = None
     # of the piece that a cut took off, by its measured face or by the caliper.
     thickness: Thickness | None = None
-    # of a cut after which the bone is tracked by its face: where a caliper is read, and the mm that
-    # it read.
+    # of a cut after which the bone is tracked by its face: where a caliper is read, or why the plan
+    # allows no reading, and the mm that it read.
     caliper_points: tuple[CaliperPoint, ...] = ()
+    caliper_refusal: str = ""
     remaining_mm: tuple[float, ...] = ()
 
     @property

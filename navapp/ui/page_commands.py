@@ -93,10 +93,12 @@ class PageCommands(QuietApp):
 
     def action_read_thickness(self) -> None:
         """Ask what a caliper reads below a cut: from the steps' page."""
-        step = next((one for one in self._view.snapshot.steps if one.is_caliper_readable), None)
+        made = [one for one in self._view.snapshot.steps if one.is_made]
+        step = next((one for one in made if one.is_caliper_readable), None)
         if step is None:
+            why = next((one.caliper_refusal for one in made if one.caliper_refusal), "")
             self.bell()
-            self.notify("no cut that is made needs a thickness", severity="warning")
+            self.notify(why or "no cut that is made needs a thickness", severity="warning")
             return
         if self._view.is_silent:
             self._say_silent(step.name)

@@ -64,6 +64,8 @@ def _tell_made(step: StepLine, stage: StageSpec, symbols: Symbols) -> list[Conte
         return _tell_hole(step.measured, stage, symbols)
     if step.is_caliper_readable:
         return _tell_caliper(step)
+    if step.caliper_refusal:
+        return [Content.styled(f"      not tracked: {step.caliper_refusal}", "$warning")]
     if step.measured is not None:
         return [*_tell_measured(step.measured, stage, symbols), *_tell_thickness(step.thickness)]
     seen = "it is not seen, or was not looked for yet"

@@ -181,6 +181,17 @@ def patella_plan() -> Plan:
     )
 
 
+def test_a_plan_that_allows_no_reading_is_told() -> None:
+    plan = patella_plan()
+    beside = replace(FLAT, point_mm=np.array([0.0, 0.0, 50.0]))
+    content = SurgicalContent(planes={"flat_patella": beside})
+    bench = navigating(Bench(plan=replace(plan, content=content, digest="")))
+    bench.do(EnterStage(4))
+    step = bench.do(ConfirmStep("flat_patella")).steps[0]
+    assert not step.is_caliper_readable
+    assert "does not meet the patella" in step.caliper_refusal
+
+
 def test_a_thickness_that_was_read_makes_another_bone_of_the_patella() -> None:
     bench = navigating(Bench(plan=patella_plan()))
     bench.do(EnterStage(4))

@@ -130,6 +130,18 @@ def test_no_thickness_is_asked_for_before_the_cut_is_made() -> None:
     play(snapshots.navigating(steps=steps, stage=STAGES[3]), script, (80, 24))
 
 
+def test_why_no_thickness_can_be_read_is_told() -> None:
+    async def script(app: BellCounter, pilot: Pilot[Any]) -> None:
+        await pilot.press("k", "r")
+        assert "not tracked: the cut leans too much" in app.text_of(StepTable)
+        assert app.n_bells == 1
+        assert [one.message for one in app._notifications] == ["the cut leans too much"]
+
+    why = "the cut leans too much"
+    steps = (replace(PATELLA, caliper_points=(), caliper_refusal=why),)
+    play(snapshots.navigating(steps=steps, stage=STAGES[3]), script, (80, 24))
+
+
 def test_steps_for_which_there_is_no_letter_are_told() -> None:
     steps = tuple(StepLine(f"cut_{k}", "cut", is_made=False) for k in range(len(STEP_KEYS) + 2))
 
