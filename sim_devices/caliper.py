@@ -29,7 +29,7 @@ class Caliper:
         """(N,) mm from the face that the saw leaves to the opposite surface of its bone, or NaN.
 
         Args:
-            cut: its name; made already or not.
+            cut: name of the planned cut; its face is the one that the saw makes, shown or not.
             points_mm: (N, 3) where the person reads, in the bone's coordinates.
             normal: (3,) unit, along which the jaws lie, out of the bone that stays.
         """

@@ -9,7 +9,7 @@ from navapp.control.commands import Command, ConfirmStep, ReadThickness, Withdra
 from navapp.errors import UsageError
 from navapp.geometry.transform import FloatArray
 from navapp.resection import list_caliper_points, needs_caliper
-from navapp.values import Plan, ResectionPlane
+from navapp.values import Plan
 
 
 class Room(Protocol):
@@ -47,7 +47,7 @@ def read_thicknesses(
     read = {}
     for name in sorted(names):
         step = plan.content.steps[name]
-        if not (isinstance(step, ResectionPlane) and needs_caliper(step)):
+        if not needs_caliper(step):
             continue
         try:
             points = list_caliper_points(plan.bones[step.bone], step)

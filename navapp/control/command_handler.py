@@ -203,10 +203,7 @@ class CommandHandler:
             text = f"mirror checked: off by {found.residual_mm:.2f} mm"
             self._session.add_event("mirror", text)
 
-    def _on_word(
-        self,
-        command: StepCommand | ConfirmCondition | WithdrawCondition,
-    ) -> None:
+    def _on_word(self, command: StepCommand | ConfirmCondition | WithdrawCondition) -> None:
         """A person says what was made, or what is so."""
         session = self._session
         try:

@@ -83,7 +83,7 @@ class MadeSteps:
         self._n_made: Counter[str] = Counter()
         self._rest_watches: dict[str, RestWatch] = {}  # by bone
         self._caliper_points = {
-            name: _find_caliper_points(plan, step)
+            name: _find_caliper_points(plan.bones[step.bone], step)
             for name, step in plan.content.steps.items()
             if step.bone in plan.bones and needs_caliper(step)
         }
@@ -190,6 +190,7 @@ class MadeSteps:
 
     def _describe(self, name: str, step: PlannedStep, *, is_made: bool) -> StepLine:
         known = self._known.get(name, _Known())
+        caliper_points, caliper_refusal = self._caliper_points.get(name, ((), ""))
         return StepLine(
             name,
             kind_of(step),
@@ -199,7 +200,8 @@ class MadeSteps:
             self._n_made[name],
             known.last,
             known.thickness,
-            *self._caliper_points.get(name, ((), "")),
+            caliper_points,
+            caliper_refusal,
             known.remaining_mm,
         )
 
@@ -215,11 +217,7 @@ class MadeSteps:
         self._n_frames += 1
         if tracked is None or tracked.estimate is None or tracked.verdict.status is not Status.OK:
             return {}
-        watch = self._rest_watches.get(tracked.bone)
-        if watch is None:
-            corners_mm = self._trackers.corners_mm(tracked.bone)
-            watch = RestWatch(corners_mm, self._trackers.row_delay_ns)
-            self._rest_watches[tracked.bone] = watch
+        watch = self._rest_watch(tracked.bone)
         if not watch.is_at_rest(frame, tracked.estimate.camera_from_bone) or rest:
             return {}
         bone, is_each = self._trackers.bone(tracked.bone), self._frames_between == 1
@@ -235,6 +233,12 @@ class MadeSteps:
         if is_accepted:
             self._keep(bone, looked, found)
         return found
+
+    def _rest_watch(self, bone: str) -> RestWatch:
+        if bone not in self._rest_watches:
+            corners_mm = self._trackers.corners_mm(bone)
+            self._rest_watches[bone] = RestWatch(corners_mm, self._trackers.row_delay_ns)
+        return self._rest_watches[bone]
 
     def _look(
         self, frame: StereoFrame, bone: CutBone, estimate: PoseEstimate, name: str
@@ -264,10 +268,11 @@ class MadeSteps:
             self._trackers.set_bone(bone.with_faces(known))
 
 
-def _find_caliper_points(plan: Plan, step: PlannedStep) -> tuple[tuple[CaliperPoint, ...], str]:
-    """Where a caliper is read, or why the plan allows no reading."""
+def _find_caliper_points(
+    bone: BoneModel, cut: ResectionPlane
+) -> tuple[tuple[CaliperPoint, ...], str]:
+    """Where a caliper is read below a cut, or why the plan allows no reading."""
     try:
-        cut = step if isinstance(step, ResectionPlane) else None
-        return () if cut is None else list_caliper_points(plan.bones[cut.bone], cut), ""
+        return list_caliper_points(bone, cut), ""
     except UsageError as error:
         return (), str(error)

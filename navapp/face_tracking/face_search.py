@@ -48,9 +48,9 @@ class FaceSearch:
         outline: OutlineMeter,
         face: MeasuredFace,
         face_meter: FaceMeter,
-        others: Sequence[Cut] = (),
+        others: Sequence[Cut],
         *,
-        has_part: bool = False,
+        has_part: bool,
     ) -> None:
         self._meter, self._outline = meter, outline
         self._face, self._face_meter, self._others = face, face_meter, others
@@ -143,11 +143,9 @@ class FaceSearch:
         """The face relative to a pose, as if that were exact."""
         left_from_bone = self._meter.geometry.rectified_from_left.inverse() @ fit.pose
         exact = replace(fit.estimate, camera_from_bone=left_from_bone, covariance=np.zeros((6, 6)))
-        pictures, times = frame.pictures, frame.times
-        shifts_px = None if times is None else times.find_shifts(frame.start)
         return self._face_meter.measure(
-            pictures.left, pictures.right, exact, self._face.plane, self._others,
-            expected=self._face.as_plane, row_shifts_px=shifts_px,
+            frame.pictures.left, frame.pictures.right, exact, self._face.plane, self._others,
+            expected=self._face.as_plane, row_shifts_px=frame.row_shifts_px,
         )  # fmt: skip
 
     def _leave_highlights_open(self, fit: Fit) -> Fit:

@@ -5,7 +5,7 @@ Of a sawn patella the cameras see the face alone; how much bone lies behind it n
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypeGuard
 
 import numpy as np
 
@@ -26,6 +26,7 @@ _ORDER = ("medial", "lateral", "left", "right", "distal", "proximal", "anterior"
 # Four readings of a flat face disagree by no more deviations. One alone that is off by up to six of
 # its own passes: 0.9 mm where the surface below is flat.
 _MOST_SIGMAS = 3.0
+_REMEDY = "plan the cut anew, across the bone"
 
 
 class CaliperPoint(NamedTuple):
@@ -37,7 +38,7 @@ class CaliperPoint(NamedTuple):
     sigma_mm: float  # standard deviation of a reading there
 
 
-def needs_caliper(step: PlannedStep) -> bool:
+def needs_caliper(step: PlannedStep) -> TypeGuard[ResectionPlane]:
     """Whether a step is a cut after which its bone is tracked by the face."""
     return isinstance(step, ResectionPlane) and step.bone in _TRACKED_BY_FACE
 
@@ -58,7 +59,9 @@ def list_caliper_points(bone: BoneModel, plane: ResectionPlane) -> tuple[Caliper
     lines = section_lines(bone.mesh, plane.heights_mm(bone.mesh.vertices_mm))
     lines = [line for line in lines if plane.is_over(line).any()]
     if not lines:
-        raise UsageError(f"the planned cut does not meet the {bone.name}", subject=bone.name)
+        raise UsageError(
+            f"the planned cut does not meet the {bone.name}", subject=bone.name, remedy=_REMEDY
+        )
     rim_mm = (max(lines, key=len) - plane.point_mm) @ plane.axes.T
     low, high = rim_mm.min(axis=0), rim_mm.max(axis=0)
     middle, half = 0.5 * (low + high), 0.5 * _TOWARDS_RIM * (high - low)
@@ -68,6 +71,7 @@ def list_caliper_points(bone: BoneModel, plane: ResectionPlane) -> tuple[Caliper
         raise UsageError(
             f"the planned cut of the {bone.name} leans too much for its thickness to be read",
             subject=bone.name,
+            remedy=_REMEDY,
         )
     names = sorted(named, key=_ORDER.index)
     return tuple(_make_point(bone, plane, name, named[name]) for name in names)
@@ -153,6 +157,7 @@ def _make_point(
             f"no bone of the {bone.name} lies below the planned cut at "
             f"({place_mm[0]:.0f}, {place_mm[1]:.0f}) mm",
             subject=bone.name,
+            remedy=_REMEDY,
         )
     corners_mm = plane.heights_mm(mesh.vertices_mm)[mesh.faces[is_below]]
     heights_mm = (spans[is_below] * corners_mm).sum(axis=1) / area[is_below]

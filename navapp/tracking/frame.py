@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from navapp.geometry.rectification import RectifiedPair
-from navapp.geometry.transform import RigidTransform
+from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.registration import BimccSettings
 from navapp.registration.step_kernels import noise_under_kernel_mm2
 from navapp.tracking.checks import PairChecks
@@ -43,6 +43,7 @@ class Frame:
     checks: PairChecks | None = None  # of the pair, begun
     # when the rows of the pictures see a moving bone; None where they see it all at once.
     times: RowTimes | None = None
+    row_shifts_px: tuple[FloatArray, FloatArray] | None = None  # of `pair` (`Rectifier.rectify`)
     # told the fraction done of a long search; what it raises stops the search.
     on_progress: Progress = ignore
 

@@ -171,7 +171,7 @@ class Tracker(ABC):
         shifts_px = None if times is None else times.find_shifts(start)
         pair = self.meter.rectify(pictures.left, pictures.right, start, margins, shifts_px)
         watch.lap("rectify")
-        return Frame(pictures, pair, start, watch, predicted, times=times)
+        return Frame(pictures, pair, start, watch, predicted, times=times, row_shifts_px=shifts_px)
 
     def begin_predicted(self, pictures: StereoPictures, state: TrackState) -> Frame:
         """Both pictures, rectified around where the motion lets expect the bone."""

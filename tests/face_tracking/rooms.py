@@ -12,6 +12,7 @@ from navapp.config.camera_sections import CameraSection, SimulationSection
 from navapp.control.stages import stage_by_name
 from navapp.devices import open_live
 from navapp.devices.simulated_plan import make_built_in_plan
+from navapp.evaluation import compute_mean_tre_mm
 from navapp.face_tracking import FaceTracker
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
@@ -45,8 +46,8 @@ class SawnRoom:
 
     def error_mm(self, pose: RigidTransform, frame: StereoFrame) -> float:
         """Mean over the targets."""
-        points_mm, truth = self.goal.targets_mm, self.truth(frame)
-        return float(np.linalg.norm(pose.apply(points_mm) - truth.apply(points_mm), axis=1).mean())
+        true, targets_mm = self.truth(frame), self.goal.targets_mm
+        return compute_mean_tre_mm(pose, true, self.bone.planned, targets_mm)
 
 
 @lru_cache(maxsize=4)

@@ -7,7 +7,7 @@ from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from navapp.registration import RegistrationModel
 from navapp.resection import CutBone
 from navapp.tracking.outline_kernels import Eye
-from navapp.values import MeasuredFace
+from navapp.values import MeasuredFace, ResectionPlane
 from tests.registration.shapes import GEOMETRY
 from tests.resection.cuts import PLANNED, bone
 
@@ -36,9 +36,26 @@ def test_it_is_the_border_of_the_face_seen_from_either_eye() -> None:
         np.testing.assert_allclose(rim.pixel, expected)
         outward = rim.pixel - rim.pixel.mean(axis=0)
         assert ((outward * rim.normal).sum(axis=1) > 0.0).all()
+        # How unsure a point is tells the skin beside it, not the face.
+        beside_mm = outline._model.seen_mesh.vertices_mm[rim.vertex]
+        assert (FACE.as_plane.heights_mm(beside_mm) < -0.03).all()
+        assert np.linalg.norm(beside_mm - in_bone_mm, axis=1).max() < 4.0
         # All around, about one point in 3 px.
         angle = np.sort(np.arctan2(outward[:, 1], outward[:, 0]))
         assert np.diff(np.append(angle, angle[0] + 2.0 * np.pi)).max() < 0.2
+
+
+def test_a_border_that_another_cut_interrupts_does_not_count() -> None:
+    aside = ResectionPlane("femur", np.array([12.0, 0.0, 0.0]), np.array([1.0, 0.0, 0.0]))
+    cut = CutBone(bone()).make("top", PLANNED).with_caliper_face("top", FACE).make("aside", aside)
+    outline = FaceOutline(RegistrationModel(cut.model), GEOMETRY, FACE)
+    pose = RigidTransform.from_parts(
+        "left_rect", "femur", rotation_from_vector((np.pi, 0.0, 0.0)), (0.0, 0.0, 450.0)
+    )
+    eye = Eye(0.0, GEOMETRY.focal_px, GEOMETRY.centre_x_px, GEOMETRY.centre_y_px)
+    nothing = np.empty((0, 0), dtype=np.float32)
+    assert len(face_outline().find_seen_rim(pose, eye, nothing, (0, 0)).pixel) > 50
+    assert len(outline.find_seen_rim(pose, eye, nothing, (0, 0)).pixel) == 0
 
 
 def test_where_a_narrow_strip_of_the_flank_is_seen_the_border_does_not_count() -> None:

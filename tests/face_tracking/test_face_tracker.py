@@ -16,7 +16,15 @@ from navapp.tracking import TrackerSettings, TrackState
 from navapp.tracking.frame import NOISE_VARIANCE_RATIO, Fit
 from navapp.tracking.methods import make_tracker
 from navapp.tracking.surface_meter import NEAR_BOX
-from navapp.values import MeasuredFace, Plan, Prior, Reason, Status, TrackedFrame
+from navapp.values import (
+    MeasuredFace,
+    Plan,
+    Prior,
+    Reason,
+    ResectionPlane,
+    Status,
+    TrackedFrame,
+)
 from tests.face_tracking.rooms import SMALL, SawnRoom, sawn_room
 
 
@@ -85,6 +93,27 @@ def test_a_face_that_is_not_confirmed_without_highlights_is_doubted(higher_mm, r
     assert reason in answer.verdict.reasons
 
 
+def test_around_a_part_what_highlights_may_do_is_left_open() -> None:
+    room = sawn_room(highlights=0.0)
+    whole, ring = room.tracker(), room.tracker()
+    ring._search._face_meter, ring._search._has_part = FakeMeter(None), True
+    measured, unmeasured = (followed(room, tracker)[0].verdict for tracker in (whole, ring))
+    assert Reason.NOT_CONVERGED not in unmeasured.reasons
+    # 0.1 px of disparity are 0.2 mm here.
+    assert unmeasured.predicted_tre_mm > np.hypot(measured.predicted_tre_mm, 0.2)
+
+
+def test_parts_and_other_cuts_of_the_bone_are_known_to_its_search() -> None:
+    room = sawn_room()
+    known = room.bone.with_caliper_face("patella", room.made)
+    plane = room.made.plane
+    aside = ResectionPlane("patella", plane.point_mm + 9.0 * plane.axes[0], plane.axes[0])
+    search = FaceTracker(room.rig, known.make("aside", aside))._search
+    assert [cut.plane for cut in search._others] == [aside]
+    assert not search._has_part
+    assert not room.tracker()._search._others
+
+
 @pytest.mark.parametrize("depth_mm", [0.0, 0.7])
 def test_what_is_no_plane_does_not_fit(depth_mm) -> None:
     """A face that is a bowl, so deep from its middle to its rim."""
@@ -105,8 +134,6 @@ def test_what_is_no_plane_does_not_fit(depth_mm) -> None:
 
 class FakeOutline:
     """Stands for the outline: it shifts the pose each time, or finds no edges."""
-
-    counts_all = False
 
     def __init__(self, *shifts_mm: float) -> None:
         self._shifts_mm = cycle(shifts_mm or (0.0,))

@@ -6,6 +6,7 @@ from functools import lru_cache
 import numpy as np
 
 from drivers.frames import StereoFrame
+from navapp.evaluation import compute_mean_tre_mm
 from navapp.geometry.box import Box
 from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.rig import StereoRig
@@ -61,9 +62,8 @@ class Room:
 
     def error_mm(self, pose: RigidTransform, frame: StereoFrame) -> float:
         """Mean over the visible vertices."""
-        truth, mesh = self.truth(frame), self.tracker.model.bone.mesh
-        points = mesh.vertices_mm[mesh.visible_vertices(truth)]
-        return float(np.linalg.norm(pose.apply(points) - truth.apply(points), axis=1).mean())
+        none_mm = np.empty((0, 3))
+        return compute_mean_tre_mm(pose, self.truth(frame), self.tracker.model.bone, none_mm)
 
 
 @lru_cache(maxsize=4)

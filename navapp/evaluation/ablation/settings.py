@@ -46,8 +46,8 @@ class AblationSettings:
         return self.knees.timed_tests
 
     def group(self, tests: Sequence[CaseTest]) -> list[tuple[CaseTest, ...]]:
-        """Each has pictures of its own."""
-        return [(test,) for test in tests]
+        """As for the tables: each has pictures of its own."""
+        return self.knees.group(tests)
 
     def count_frames(self, test: CaseTest) -> int:
         """As for the tables: a test with an instrument lasts until that has passed once."""

@@ -78,10 +78,9 @@ class HighlightSearch:
         """What is measured at a pose, and what measures so nearby; None without highlights."""
         region = self._meter.find_region(pose, NEAR_VIEW)
         expected = self._meter.render(frame.pair, pose, NEAR_BOX)
-        left, right, times = frame.pictures.left, frame.pictures.right, frame.times
+        left, right, shifts_px = frame.pictures.left, frame.pictures.right, frame.row_shifts_px
         if left.ndim == 2 or region is None or expected is None:
             return None
-        shifts_px = None if times is None else times.find_shifts(frame.start)
         coloured = self._meter.rectifier.rectify(left, right, *region, row_shifts_px=shifts_px)
         matte = make_matte_pair(
             replace(coloured, box=expected.pair.box), np.isfinite(expected.support_px)
