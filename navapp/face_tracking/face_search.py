@@ -20,10 +20,10 @@ from navapp.values import MeasuredFace, PoseEstimate, Reason
 # All chosen. Where the bone may be around the expected pose (standard deviations): it stands for
 # what a plane leaves free, until the outline fixes it.
 _WINDOW_MM, _WINDOW_RAD = 2.0, 0.05
-# Rounds: the first ones on samples of the face, which are found from further away; those with whole
-# steps; all of them at most. Mean motion of the corners of the bone's hull: below, the bone rests;
-# above, after the last round, it does not.
-_SAMPLED_ROUNDS, _WHOLE_STEPS, _MAX_ROUNDS, _REST_MM, _NEAR_MM = 2, 4, 8, 0.02, 0.1
+# Rounds: the first ones on samples of the face, which are found from further away; all of them at
+# most. Mean motion of the corners of the bone's hull: below, the bone rests; above, after the last
+# round, it does not.
+_SAMPLED_ROUNDS, _MAX_ROUNDS, _REST_MM, _NEAR_MM = 2, 8, 0.02, 0.1
 # Of the plane's fit.
 _STEPS = 6
 # Deviation of sawn, wet bone in grey pictures over what the judge expects of bone, at most.
@@ -89,11 +89,8 @@ class FaceSearch:
                 # Edges of what lies before the face are none of its border.
                 coarse_px = frame.checks.check(measured, pose).result().coarse_px
             joined = self._outline.join(frame.pair, fit, coarse_px, NOISE_VARIANCE_RATIO)
-            # A few edges come and go with the pose: half steps end that.
-            share = 1.0 if n_round < _WHOLE_STEPS else 0.5
             moved_mm = pose.mean_motion_mm(joined.pose, meter.model.hull_mm)
-            twist = share * pose.twist_to(joined.pose, meter.model.centre_mm)
-            pose = pose.move(twist, pose.apply(meter.model.centre_mm))
+            pose = joined.pose
             fit = replace(fit, estimate=replace(estimate, camera_from_bone=pose))
             frame.watch.lap("estimate")
             if not is_sampled and moved_mm < _REST_MM:
