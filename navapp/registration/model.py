@@ -76,10 +76,14 @@ class RegistrationModel:
         has_lid: bool = False,
     ) -> RenderedView:
         """The bone at a pose in a box of the rectified left view; its lid hides, unseen or seen."""
-        mesh, lid = self.rendered_mesh, self.bone.lid
+        mesh = self.rendered_mesh
         view = render_rectified(mesh, camera_from_bone, geometry, box, n_outward=self._n_outward)
-        if lid is not None and not has_lid:
-            is_lid = view.face_index >= len(mesh.faces) - len(lid.faces)
+        return view if has_lid else self.without_lid(view)
+
+    def without_lid(self, view: RenderedView) -> RenderedView:
+        """A view with the lid, which is changed: the lid hides, but is not seen."""
+        if (lid := self.bone.lid) is not None:
+            is_lid = view.face_index >= len(self.rendered_mesh.faces) - len(lid.faces)
             view.depth_mm[is_lid], view.face_index[is_lid] = np.nan, -1
         return view
 

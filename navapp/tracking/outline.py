@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.bands import run_both
+from navapp.geometry.both_eyes_kernels import warp_depth
 from navapp.geometry.box import Box
 from navapp.geometry.mesh_edges import ridge_edges
 from navapp.geometry.rectification import Image, RectifiedGeometry, RectifiedPair
@@ -28,7 +29,6 @@ from navapp.tracking.outline_kernels import (
     find_rim,
     is_outline,
     thin_rim,
-    warp_depth,
 )
 from navapp.tracking.surface_meter import MODEL_CORRELATION_PX
 from navapp.values import DisparityMap, Origin
@@ -179,7 +179,8 @@ class OutlineMeter:
         first_column = box.x - math.ceil(near_px)
         width = box.width + math.ceil(near_px) - math.floor(far_px)
         warped = np.full((box.height, width), np.nan, dtype=np.float32)
-        warp_depth(view.depth_mm, box.x, self._right, warped, first_column)
+        scale_px_mm = self._geometry.focal_px * self._geometry.baseline_mm
+        warp_depth(view.depth_mm, box.x, scale_px_mm, warped, first_column)
         return warped, first_column
 
     def _is_free(

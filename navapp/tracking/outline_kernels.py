@@ -101,35 +101,6 @@ def find_rim(
 
 
 @njit(cache=True, nogil=True)
-def warp_depth(
-    depth: NDArray[np.float32], first_column: int, eye: Eye, warped: NDArray[np.float32],
-    first_warped: int,
-) -> None:  # fmt: skip
-    """The left depth buffer as an eye further right sees it; what only that eye sees is missing.
-
-    Args:
-        depth: (h, w) mm, NaN where nothing is.
-        first_column: of the buffer in the left picture.
-        eye: that looks.
-        warped: (h, w2) in place, filled with NaN.
-        first_warped: column of its first pixel in the eye's picture.
-    """
-    height, width = depth.shape
-    last_column, shift_px = warped.shape[1] - 1, np.float32(first_column - first_warped)
-    scale_px_mm = np.float32(eye.focal_px * eye.x_mm)
-    for r in range(height):
-        for c in range(width):
-            z = depth[r, c]
-            if not z > np.float32(0.0):
-                continue
-            at = int(np.floor(np.float32(c) + shift_px - scale_px_mm / z))
-            if 0 <= at <= last_column and not warped[r, at] <= z:
-                warped[r, at] = z
-            if -1 <= at < last_column and not warped[r, at + 1] <= z:
-                warped[r, at + 1] = z
-
-
-@njit(cache=True, nogil=True)
 def is_outline(
     rim: Rim, depth: NDArray[np.float32], first_column: int, first_row: int
 ) -> NDArray[np.bool_]:

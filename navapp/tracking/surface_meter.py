@@ -11,6 +11,7 @@ from functools import cached_property, lru_cache, partial
 import numpy as np
 from numpy.typing import NDArray
 
+from navapp.geometry.both_eyes_kernels import mark_unclear
 from navapp.geometry.box import Box
 from navapp.geometry.masks import grow, large_regions
 from navapp.geometry.rectification import Image, RectifiedPair, rectifier_of
@@ -45,6 +46,8 @@ _LARGEST_HIGHLIGHT_PX2 = 400
 _MIXED_PX = 3
 # Where a smaller fraction would be left, the gaps come from a pose that is still off.
 _LEAST_UNMIXED_FRACTION = 0.5
+# Nearer to an outline the lens and the interpolation mix the model with what lies beside it.
+_UNCLEAR_PX = 1
 # Poses of which the bounds are kept.
 _KEPT_BOUNDS = 8
 
@@ -106,7 +109,8 @@ class Expected:
     """What is to be seen of the model at a pose."""
 
     pair: RectifiedPair  # with the model's box
-    support_px: NDArray[np.float32]  # (h, w) disparity of the model over the box, NaN beside it
+    # (h, w) disparity of the model over the box, NaN beside it and where an eye sees more than it.
+    support_px: NDArray[np.float32]
     view: RenderedView  # the model in that box
 
 
@@ -225,8 +229,12 @@ class SurfaceMeter:
         region = self.find_region(pose, margins)
         if region is None:
             return None
-        view = self.model.render(pose, self.geometry, region[0])
+        view = self.model.render(pose, self.geometry, region[0], has_lid=True)
         support_px = self.geometry.disparity_map_px(view.depth_mm)
+        is_unclear = np.zeros(support_px.shape, dtype=np.bool_)
+        mark_unclear(support_px, _UNCLEAR_PX, is_unclear)
+        view = self.model.without_lid(view)
+        support_px[is_unclear | ~view.mask] = np.nan
         return Expected(replace(pair, box=region[0]), support_px, view)
 
     def measure_on_model(

@@ -49,19 +49,6 @@ def smoothed(pixel, normal, length):
     return unit, is_outermost
 
 
-def warped(depth, first_column, eye, width, first_warped):
-    """(h, width) the left buffer as another eye sees it, each pixel two pixels wide."""
-    answer = np.full((len(depth), width), np.inf)
-    rows, columns = np.nonzero(depth > 0.0)
-    z = depth[rows, columns]
-    at = columns + first_column - eye.focal_px * eye.x_mm / z - first_warped
-    for side in range(2):
-        column = np.floor(at).astype(int) + side
-        inside = (column >= 0) & (column < width)
-        np.minimum.at(answer, (rows[inside], column[inside]), z[inside])
-    return np.where(np.isinf(answer), np.nan, answer)
-
-
 def profile(picture, x, y, normal, half):
     """(2 half + 1,) grey values each half pixel along a normal, mean of three lines."""
     along = 0.5 * np.arange(-half, half + 1)

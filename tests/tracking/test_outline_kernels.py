@@ -14,7 +14,6 @@ from navapp.tracking.outline_kernels import (
     find_rim,
     is_outline,
     thin_rim,
-    warp_depth,
 )
 from tests.geometry.shapes import sphere
 from tests.reference import outline_reference as reference
@@ -84,39 +83,6 @@ def test_the_seen_rim_runs_along_the_silhouette() -> None:
     border = np.column_stack([columns + view.box.x, rows + view.box.y])
     apart = np.linalg.norm(border[:, None] - seen[None], axis=2).min(axis=1)
     assert np.quantile(apart, 0.9) < 4.0
-
-
-@pytest.mark.kernel
-@pytest.mark.parametrize(("before", "width"), [(270, 400), (200, 150), (150, 60)])
-def test_the_warped_buffer_is_that_of_the_reference(before: int, width: int) -> None:
-    """Also where it ends before the surface does, on either side."""
-    view = left_view()
-    # What is written beside the buffer would show.
-    around = np.full((view.box.height, width + 20), np.nan, dtype=np.float32)
-    warped, first = around[:, 10:-10], view.box.x - before
-    warp_depth(view.depth_mm, view.box.x, RIGHT, warped, first)
-    expected = reference.warped(view.depth_mm, view.box.x, RIGHT, width, first)
-    assert np.isfinite(warped).mean() > 0.2
-    # A pixel that falls on a border may round to either side.
-    is_same = np.isclose(warped, expected, rtol=1e-6, equal_nan=True)
-    assert is_same.mean() > 0.999
-    assert np.isnan(around[:, :10]).all()
-    assert np.isnan(around[:, -10:]).all()
-
-
-@pytest.mark.kernel
-def test_the_nearer_of_two_stays_in_the_warped_buffer() -> None:
-    scale_px_mm, first = RIGHT.focal_px * RIGHT.x_mm, -300
-    depth = np.full((2, 400), np.nan, dtype=np.float32)
-    # The far one comes first in a row, the near one falls on its columns.
-    depth[0, 94], depth[0, 150] = scale_px_mm / 224.4, scale_px_mm / 280.4
-    # The near one comes first, and the far one falls on its second column.
-    depth[1, 150], depth[1, 151] = scale_px_mm / 280.6, scale_px_mm / 280.3
-    warped = np.full((2, 400), np.nan, dtype=np.float32)
-    warp_depth(depth, 0, RIGHT, warped, first)
-    np.testing.assert_allclose(warped, reference.warped(depth, 0, RIGHT, 400, first), rtol=1e-6)
-    assert np.flatnonzero(warped[0] == depth[0, 150]).tolist() == [169, 170]
-    assert np.flatnonzero(warped[1] == depth[1, 150]).tolist() == [169, 170]
 
 
 @pytest.mark.kernel
