@@ -3,8 +3,13 @@
 import numpy as np
 import pytest
 
-from navapp.tracking.surface_meter import NEAR_BOX, NEAR_VIEW, remove_gap_rims
+from navapp.geometry.masks import grow
+from navapp.registration import RegistrationModel
+from navapp.resection.remaining_bone import Cut, remove_cuts
+from navapp.tracking.surface_meter import NEAR_BOX, NEAR_VIEW, SurfaceMeter, remove_gap_rims
 from navapp.values import DisparityMap
+from tests.reference.both_eyes_reference import unclear
+from tests.resection import cuts
 from tests.tracking.rooms import room
 
 SHAPE = (80, 120)
@@ -65,3 +70,24 @@ def test_relief_goes_together_over_four_millimetres() -> None:
     depth_mm = np.median(measured.cloud.points_mm[:, 2])
     expected_px = 4.0 * meter.geometry.focal_px / depth_mm
     assert measured.relief_px == pytest.approx(expected_px, rel=0.01)
+
+
+def test_near_its_outlines_a_bone_is_measured_as_well_as_elsewhere() -> None:
+    """At the true pose, of a cut ball before a wall; the right eye does not see its left flank."""
+    bone = remove_cuts(cuts.bone(), [Cut(cuts.MADE, 0.3)])
+    meter = SurfaceMeter(cuts.rig(), RegistrationModel(bone), (200.0, 900.0))
+    pose = meter.geometry.rectified_from_left @ cuts.pose()
+    pair = meter.rectify(*cuts.pictures(cuts.pose()), pose, NEAR_VIEW)
+    expected = meter.render(pair, pose, NEAR_BOX)
+    assert expected is not None
+    is_seen, is_asked = expected.view.mask, np.isfinite(expected.support_px)
+    whole = meter.model.render(pose, meter.geometry, expected.view.box, has_lid=True)
+    whole_px = meter.geometry.disparity_map_px(whole.depth_mm)
+    np.testing.assert_array_equal(is_asked, is_seen & ~unclear(whole_px, 1))
+    assert 0.5 < is_asked.sum() / is_seen.sum() < 0.8
+    # Where the face begins the bone goes on: that is no outline.
+    assert (is_asked & grow(whole.mask & ~is_seen, 1)).sum() > 20
+    found = meter.measure_on_model(expected).disparity
+    offset_px = (found.disparity_px - whole_px)[found.is_matched]
+    assert len(offset_px) > 400
+    assert np.sqrt(np.mean(offset_px**2)) < 0.025
