@@ -1,4 +1,4 @@
-"""Compiled answers to what the right eye sees of a surface that is rendered for the left one."""
+"""Compiled search for what the right eye sees of a rendered left view, and for its outlines."""
 
 import numpy as np
 from numba import njit
@@ -18,7 +18,7 @@ def warp_depth(
     Args:
         depth_mm: (h, w), NaN where nothing is.
         first_column: of the buffer in the left picture.
-        scale_px_mm: disparity times depth; 0: the eye is the left one.
+        scale_px_mm: disparity times depth.
         warped_mm: (h, w2) in place, filled with NaN.
         first_warped: column of its first pixel in the right picture.
     """
@@ -47,8 +47,8 @@ def mark_unclear(
 
     Args:
         disparity_px: (h, w) of what is rendered in the left picture, NaN beside it.
-        reach_px: around the pixels next to an outline in the left picture; in the right one so many
-            columns from an outline on.
+        reach_px: in the left picture, around the pixels on both sides of an outline; in the right
+            one, columns from the left end of a surface on.
         is_unclear: (h, w) in place, all False before.
     """
     height, width = disparity_px.shape
@@ -81,7 +81,8 @@ def _is_outline(disparity_px: NDArray[np.float32], y: int, x: int) -> bool:
 def _find_hidden(row_px: NDArray[np.float32], is_hidden: NDArray[np.bool_]) -> None:
     """What the right eye does not see of a row (w,).
 
-    It is hidden by what lies further right in the left picture, and does not in the right one.
+    It is hidden by what lies further right in the left picture and not in the right one. Behind a
+    thin thing that is too much: the right eye sees again what lies on its other side.
     """
     first = np.inf
     for x in range(len(row_px) - 1, -1, -1):
@@ -98,7 +99,10 @@ def _mark_for_right_eye(
     reach_px: int,
     is_unclear: NDArray[np.bool_],
 ) -> None:
-    """Mark what is hidden of a row (w,), and what the right eye sees next to an outline's right."""
+    """Mark what is hidden of a row (w,), and the left ends of surfaces as the right eye sees them.
+
+    What it sees of a far surface just left of a near one is not marked: that gained nothing.
+    """
     edge = -np.inf
     for x in range(len(row_px)):
         if is_hidden[x]:

@@ -78,14 +78,15 @@ class RegistrationModel:
         """The bone at a pose in a box of the rectified left view; its lid hides, unseen or seen."""
         mesh = self.rendered_mesh
         view = render_rectified(mesh, camera_from_bone, geometry, box, n_outward=self._n_outward)
-        return view if has_lid else self.without_lid(view)
+        if not has_lid:
+            self.take_out_lid(view)
+        return view
 
-    def without_lid(self, view: RenderedView) -> RenderedView:
-        """A view with the lid, which is changed: the lid hides, but is not seen."""
+    def take_out_lid(self, view: RenderedView) -> None:
+        """Change a view in which the lid is seen: nothing is seen there."""
         if (lid := self.bone.lid) is not None:
             is_lid = view.face_index >= len(self.rendered_mesh.faces) - len(lid.faces)
             view.depth_mm[is_lid], view.face_index[is_lid] = np.nan, -1
-        return view
 
     @cached_property
     def rendered_face_sigma_mm(self) -> FloatArray:

@@ -46,8 +46,9 @@ _LARGEST_HIGHLIGHT_PX2 = 400
 _MIXED_PX = 3
 # Where a smaller fraction would be left, the gaps come from a pose that is still off.
 _LEAST_UNMIXED_FRACTION = 0.5
-# Nearer to an outline the lens and the interpolation mix the model with what lies beside it.
-_UNCLEAR_PX = 1
+# So near to an outline the lens and the interpolation mix the model with what lies beside it. Of a
+# face that is tracked a part leaves a narrow ring.
+_UNCLEAR_PX, _UNCLEAR_ON_FACE_PX = 1, 0
 # Poses of which the bounds are kept.
 _KEPT_BOUNDS = 8
 
@@ -109,7 +110,8 @@ class Expected:
     """What is to be seen of the model at a pose."""
 
     pair: RectifiedPair  # with the model's box
-    # (h, w) disparity of the model over the box, NaN beside it and where an eye sees more than it.
+    # (h, w) disparity of the model over the box; NaN beside it, at its outlines in either picture,
+    # and where the right eye does not see it.
     support_px: NDArray[np.float32]
     view: RenderedView  # the model in that box
 
@@ -232,8 +234,9 @@ class SurfaceMeter:
         view = self.model.render(pose, self.geometry, region[0], has_lid=True)
         support_px = self.geometry.disparity_map_px(view.depth_mm)
         is_unclear = np.zeros(support_px.shape, dtype=np.bool_)
-        mark_unclear(support_px, _UNCLEAR_PX, is_unclear)
-        view = self.model.without_lid(view)
+        reach_px = _UNCLEAR_PX if self.model.bone.face is None else _UNCLEAR_ON_FACE_PX
+        mark_unclear(support_px, reach_px, is_unclear)
+        self.model.take_out_lid(view)
         support_px[is_unclear | ~view.mask] = np.nan
         return Expected(replace(pair, box=region[0]), support_px, view)
 

@@ -72,7 +72,7 @@ def test_relief_goes_together_over_four_millimetres() -> None:
     assert measured.relief_px == pytest.approx(expected_px, rel=0.01)
 
 
-def test_near_its_outlines_a_bone_is_measured_as_well_as_elsewhere() -> None:
+def test_what_an_outline_is_mixed_with_does_not_pull_what_is_measured() -> None:
     """At the true pose, of a cut ball before a wall; the right eye does not see its left flank."""
     bone = remove_cuts(cuts.bone(), [Cut(cuts.MADE, 0.3)])
     meter = SurfaceMeter(cuts.rig(), RegistrationModel(bone), (200.0, 900.0))
