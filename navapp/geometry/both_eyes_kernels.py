@@ -49,7 +49,7 @@ def mark_unclear(
         disparity_px: (h, w) of what is rendered in the left picture, NaN beside it.
         reach_px: in the left picture, around the pixels on both sides of an outline; in the right
             one, columns from the left end of a surface on.
-        is_unclear: (h, w) in place, all False before.
+        is_unclear: (h, w) in place; others stay as they are.
     """
     height, width = disparity_px.shape
     is_hidden = np.empty(width, np.bool_)

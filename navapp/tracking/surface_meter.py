@@ -30,7 +30,7 @@ from navapp.stereo import (
     refine,
     refine_on_model,
 )
-from navapp.values import DisparityMap, Origin, SurfaceCloud
+from navapp.values import BoneModel, DisparityMap, Origin, SurfaceCloud
 
 # All chosen but where a source stands beside it.
 # Errors of a free measurement are correlated over smooth bone, and over tissue that lies flush with
@@ -48,7 +48,7 @@ _MIXED_PX = 3
 _LEAST_UNMIXED_FRACTION = 0.5
 # So near to an outline the lens and the interpolation mix the model with what lies beside it. Of a
 # face that is tracked a part leaves a narrow ring.
-_UNCLEAR_PX, _UNCLEAR_ON_FACE_PX = 1, 0
+OUTLINE_REACH_PX, _REACH_ON_FACE_PX = 1, 0
 # Poses of which the bounds are kept.
 _KEPT_BOUNDS = 8
 
@@ -123,12 +123,16 @@ class SurfaceMeter:
         rig: of the pictures.
         model: of the bone.
         depth_mm: nearest and farthest surface that the rig is used for.
+
+    Attributes:
+        outline_reach_px: as of `mark_unclear`; None: the model is matched up to its outlines.
     """
 
     def __init__(
         self, rig: StereoRig, model: RegistrationModel, depth_mm: tuple[float, float]
     ) -> None:
         self.model, self.depth_mm = model, depth_mm
+        self.outline_reach_px = _find_outline_reach_px(model.bone)
         self.rectifier = rectifier_of(rig)
         self.geometry = self.rectifier.geometry
         self._relief_mm_px = RELIEF_LENGTH_MM * self.geometry.focal_px
@@ -233,11 +237,11 @@ class SurfaceMeter:
             return None
         view = self.model.render(pose, self.geometry, region[0], has_lid=True)
         support_px = self.geometry.disparity_map_px(view.depth_mm)
-        is_unclear = np.zeros(support_px.shape, dtype=np.bool_)
-        reach_px = _UNCLEAR_PX if self.model.bone.face is None else _UNCLEAR_ON_FACE_PX
-        mark_unclear(support_px, reach_px, is_unclear)
         self.model.take_out_lid(view)
-        support_px[is_unclear | ~view.mask] = np.nan
+        is_unclear = ~view.mask
+        if self.outline_reach_px is not None:
+            mark_unclear(support_px, self.outline_reach_px, is_unclear)
+        support_px[is_unclear] = np.nan
         return Expected(replace(pair, box=region[0]), support_px, view)
 
     def measure_on_model(
@@ -286,6 +290,13 @@ class SurfaceMeter:
         """About `_N_POINTS` of the measured ones."""
         stride_px = max(1, round((found.n_matched / _N_POINTS) ** 0.5))
         return found.reproject(self.geometry, stride_px)
+
+
+def _find_outline_reach_px(bone: BoneModel) -> int | None:
+    """None of a whole bone: its rims are a small part of what is seen of it."""
+    if bone.face is not None:
+        return _REACH_ON_FACE_PX
+    return None if bone.lid is None else OUTLINE_REACH_PX
 
 
 def remove_gap_rims(found: DisparityMap, is_expected: NDArray[np.bool_]) -> DisparityMap:

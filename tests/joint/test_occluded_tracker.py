@@ -1,5 +1,7 @@
 """A bone behind another one: what is rendered, what is measured, and how a spread is judged."""
 
+from copy import copy
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from navapp.tracking import TrackerSettings, TrackState
 from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.tracking.frame import NOISE_VARIANCE_RATIO
 from navapp.tracking.judging import PoseJudge
+from navapp.tracking.surface_meter import OUTLINE_REACH_PX
 from navapp.values import DisparityMap, Status
 from tests.geometry.shapes import sphere
 from tests.registration.shapes import GEOMETRY
@@ -66,11 +69,15 @@ def hidden_room(spread=None):
 
 
 def test_behind_nothing_a_bone_is_judged_as_ever() -> None:
+    """But that it is not matched up to its outlines."""
     a, hidden = hidden_room()
     frame = a.frames[0]
     state = TrackState.at_rest(a.truth(frame), frame.captured_ns)
     args = frame, state, GOAL
-    one, other = (tracker.glance(*args)[0] for tracker in (a.tracker, hidden))
+    clear = copy(a.tracker.meter)
+    clear.outline_reach_px = OUTLINE_REACH_PX
+    seen = BimccTracker(a.rig, a.tracker.model.bone, meter=clear)
+    one, other = (tracker.glance(*args)[0] for tracker in (seen, hidden))
     assert one.verdict.status is Status.OK
     assert other.verdict == one.verdict
     assert (other.estimate.covariance == one.estimate.covariance).all()

@@ -5,14 +5,15 @@ import pytest
 
 from navapp.geometry.masks import grow
 from navapp.registration import RegistrationModel
-from navapp.resection.remaining_bone import Cut, remove_cuts
+from navapp.resection.remaining_bone import Cut, close_with_face, remove_cuts, remove_holes
 from navapp.tracking.surface_meter import NEAR_BOX, NEAR_VIEW, SurfaceMeter, remove_gap_rims
-from navapp.values import DisparityMap
+from navapp.values import DisparityMap, DrillAxis, MeasuredFace
 from tests.reference.both_eyes_reference import unclear
 from tests.resection import cuts
 from tests.tracking.rooms import room
 
 SHAPE = (80, 120)
+HOLE = DrillAxis("femur", np.array([0.0, 0.0, 12.0]), np.array([0.0, 0.0, -1.0]), 5.0, 6.0)
 EVERYWHERE = np.ones(SHAPE, dtype=bool)
 
 
@@ -91,3 +92,22 @@ def test_what_an_outline_is_mixed_with_does_not_pull_what_is_measured() -> None:
     offset_px = (found.disparity_px - whole_px)[found.is_matched]
     assert len(offset_px) > 400
     assert np.sqrt(np.mean(offset_px**2)) < 0.025
+
+
+def test_a_whole_bone_is_matched_up_to_its_outlines_and_a_face_nearly() -> None:
+    whole = cuts.bone()
+    cut = remove_cuts(whole, [Cut(cuts.MADE, 0.3)])
+    face = MeasuredFace(cuts.PLANNED, np.zeros(3), 1e-3 * np.eye(3), 0.9)
+    faced = close_with_face(whole, face)
+    reach = [
+        SurfaceMeter(cuts.rig(), RegistrationModel(bone), (200.0, 900.0)).outline_reach_px
+        for bone in (whole, cut, faced, remove_holes(faced, [HOLE], 0.5))
+    ]
+    assert reach == [None, 1, 0, 0]
+    a = room()
+    picture, meter = a.frames[0], a.tracker.meter
+    pose = a.tracker.rectify_pose(a.truth(picture))
+    pair = meter.rectify(picture.left, picture.right, pose, NEAR_VIEW)
+    expected = meter.render(pair, pose, NEAR_BOX)
+    assert expected is not None
+    np.testing.assert_array_equal(np.isfinite(expected.support_px), expected.view.mask)
