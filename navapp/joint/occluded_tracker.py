@@ -17,7 +17,6 @@ from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.tracking.checks import PairCheck
 from navapp.tracking.frame import NOISE_VARIANCE_RATIO, Fit, Frame
 from navapp.tracking.judging import PoseJudge
-from navapp.tracking.surface_meter import OUTLINE_REACH_PX
 from navapp.values import DisparityMap
 
 # Both chosen. Windows that reach over the occluder's outline see both bones.
@@ -146,7 +145,7 @@ class OccludedTracker(BimccTracker):
         self.occluder = Occluder(mesh, tracker.rectify_pose(left_from_mesh), geometry)
         meter = copy(tracker.meter)
         meter.model = _OccludedModel(tracker.meter.model, self.occluder)
-        meter.outline_reach_px = OUTLINE_REACH_PX
+        meter.leaves_out_outlines = True
         super().__init__(meter.rectifier.rig, tracker.model.bone, tracker.settings, meter=meter)
         self._whole = tracker.model
         self.judge = self.judge_with(np.zeros((6, 6)) if spread is None else spread)

@@ -83,7 +83,7 @@ class RegistrationModel:
         return view
 
     def take_out_lid(self, view: RenderedView) -> None:
-        """Change a view in which the lid is seen: nothing is seen there."""
+        """Clear a view, in place, where it shows the lid: that hides, and is no bone's surface."""
         if (lid := self.bone.lid) is not None:
             is_lid = view.face_index >= len(self.rendered_mesh.faces) - len(lid.faces)
             view.depth_mm[is_lid], view.face_index[is_lid] = np.nan, -1

@@ -30,7 +30,7 @@ from navapp.stereo import (
     refine,
     refine_on_model,
 )
-from navapp.values import BoneModel, DisparityMap, Origin, SurfaceCloud
+from navapp.values import DisparityMap, Origin, SurfaceCloud
 
 # All chosen but where a source stands beside it.
 # Errors of a free measurement are correlated over smooth bone, and over tissue that lies flush with
@@ -46,9 +46,8 @@ _LARGEST_HIGHLIGHT_PX2 = 400
 _MIXED_PX = 3
 # Where a smaller fraction would be left, the gaps come from a pose that is still off.
 _LEAST_UNMIXED_FRACTION = 0.5
-# So near to an outline the lens and the interpolation mix the model with what lies beside it. Of a
-# face that is tracked a part leaves a narrow ring.
-OUTLINE_REACH_PX, _REACH_ON_FACE_PX = 1, 0
+# As of `mark_unclear`, where outlines are left out.
+_OUTLINE_REACH_PX = 1
 # Poses of which the bounds are kept.
 _KEPT_BOUNDS = 8
 
@@ -110,8 +109,7 @@ class Expected:
     """What is to be seen of the model at a pose."""
 
     pair: RectifiedPair  # with the model's box
-    # (h, w) disparity of the model over the box; NaN beside it, at its outlines in either picture,
-    # and where the right eye does not see it.
+    # (h, w) disparity of the model over the box, NaN beside it and where it is not matched.
     support_px: NDArray[np.float32]
     view: RenderedView  # the model in that box
 
@@ -125,14 +123,16 @@ class SurfaceMeter:
         depth_mm: nearest and farthest surface that the rig is used for.
 
     Attributes:
-        outline_reach_px: as of `mark_unclear`; None: the model is matched up to its outlines.
+        leaves_out_outlines: the model is not matched at its outlines, nor where the right eye does
+            not see it. So it is of a bone that was worked on, but for a tracked face, of which a
+            part leaves a narrow ring. Of a whole bone the rims are a small part.
     """
 
     def __init__(
         self, rig: StereoRig, model: RegistrationModel, depth_mm: tuple[float, float]
     ) -> None:
         self.model, self.depth_mm = model, depth_mm
-        self.outline_reach_px = _find_outline_reach_px(model.bone)
+        self.leaves_out_outlines = model.bone.lid is not None and model.bone.face is None
         self.rectifier = rectifier_of(rig)
         self.geometry = self.rectifier.geometry
         self._relief_mm_px = RELIEF_LENGTH_MM * self.geometry.focal_px
@@ -239,8 +239,8 @@ class SurfaceMeter:
         support_px = self.geometry.disparity_map_px(view.depth_mm)
         self.model.take_out_lid(view)
         is_unclear = ~view.mask
-        if self.outline_reach_px is not None:
-            mark_unclear(support_px, self.outline_reach_px, is_unclear)
+        if self.leaves_out_outlines:
+            mark_unclear(support_px, _OUTLINE_REACH_PX, is_unclear)
         support_px[is_unclear] = np.nan
         return Expected(replace(pair, box=region[0]), support_px, view)
 
@@ -290,13 +290,6 @@ class SurfaceMeter:
         """About `_N_POINTS` of the measured ones."""
         stride_px = max(1, round((found.n_matched / _N_POINTS) ** 0.5))
         return found.reproject(self.geometry, stride_px)
-
-
-def _find_outline_reach_px(bone: BoneModel) -> int | None:
-    """None of a whole bone: its rims are a small part of what is seen of it."""
-    if bone.face is not None:
-        return _REACH_ON_FACE_PX
-    return None if bone.lid is None else OUTLINE_REACH_PX
 
 
 def remove_gap_rims(found: DisparityMap, is_expected: NDArray[np.bool_]) -> DisparityMap:

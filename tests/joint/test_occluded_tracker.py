@@ -13,7 +13,6 @@ from navapp.tracking import TrackerSettings, TrackState
 from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.tracking.frame import NOISE_VARIANCE_RATIO
 from navapp.tracking.judging import PoseJudge
-from navapp.tracking.surface_meter import OUTLINE_REACH_PX
 from navapp.values import DisparityMap, Status
 from tests.geometry.shapes import sphere
 from tests.registration.shapes import GEOMETRY
@@ -75,7 +74,7 @@ def test_behind_nothing_a_bone_is_judged_as_ever() -> None:
     state = TrackState.at_rest(a.truth(frame), frame.captured_ns)
     args = frame, state, GOAL
     clear = copy(a.tracker.meter)
-    clear.outline_reach_px = OUTLINE_REACH_PX
+    clear.leaves_out_outlines = True
     seen = BimccTracker(a.rig, a.tracker.model.bone, meter=clear)
     one, other = (tracker.glance(*args)[0] for tracker in (seen, hidden))
     assert one.verdict.status is Status.OK

@@ -94,20 +94,15 @@ def test_what_an_outline_is_mixed_with_does_not_pull_what_is_measured() -> None:
     assert np.sqrt(np.mean(offset_px**2)) < 0.025
 
 
-def test_a_whole_bone_is_matched_up_to_its_outlines_and_a_face_nearly() -> None:
+def test_whole_bones_and_tracked_faces_are_matched_up_to_their_outlines() -> None:
     whole = cuts.bone()
-    cut = remove_cuts(whole, [Cut(cuts.MADE, 0.3)])
     face = MeasuredFace(cuts.PLANNED, np.zeros(3), 1e-3 * np.eye(3), 0.9)
     faced = close_with_face(whole, face)
-    reach = [
-        SurfaceMeter(cuts.rig(), RegistrationModel(bone), (200.0, 900.0)).outline_reach_px
-        for bone in (whole, cut, faced, remove_holes(faced, [HOLE], 0.5))
-    ]
-    assert reach == [None, 1, 0, 0]
-    a = room()
-    picture, meter = a.frames[0], a.tracker.meter
-    pose = a.tracker.rectify_pose(a.truth(picture))
-    pair = meter.rectify(picture.left, picture.right, pose, NEAR_VIEW)
-    expected = meter.render(pair, pose, NEAR_BOX)
-    assert expected is not None
-    np.testing.assert_array_equal(np.isfinite(expected.support_px), expected.view.mask)
+    for bone in (whole, faced, remove_holes(faced, [HOLE], 0.5)):
+        meter = SurfaceMeter(cuts.rig(), RegistrationModel(bone), (200.0, 900.0))
+        pose = meter.geometry.rectified_from_left @ cuts.pose()
+        expected = meter.render(
+            meter.rectify(*cuts.pictures(cuts.pose()), pose, NEAR_VIEW), pose, NEAR_BOX
+        )
+        assert expected is not None
+        np.testing.assert_array_equal(np.isfinite(expected.support_px), expected.view.mask)
