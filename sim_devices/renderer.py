@@ -266,7 +266,12 @@ class Renderer:
         lamps = self._turn_lamps(inverse, camera_from_lamps)
         corner_px2 = 0.25 * (self._camera.width**2 + self._camera.height**2)
         constants = np.array(
-            [1.0 / FINE_VOXEL_MM, 1.0 / COARSE_VOXEL_MM, surfaces.vignetting / corner_px2],
+            [
+                1.0 / FINE_VOXEL_MM,
+                1.0 / COARSE_VOXEL_MM,
+                surfaces.vignetting / corner_px2,
+                self._camera.focal_px,
+            ],
             dtype=np.float32,
         )
         shade(

@@ -21,6 +21,8 @@ _LAMP_RADIUS, _LAMP_LIGHT = 0.13, 1.0 / 0.13**2
 # The swizzle and shift of the second lookup keep it unrelated to the first.
 _SHIFT_X, _SHIFT_Y, _SHIFT_Z = 41.3, 17.9, 73.1
 _INV_SIGMA = 1.0 / 40.0
+# Look-ups of a pixel at most: of a surface that falls away by 16 mm per mm across, 86 degrees.
+_MOST_LOOKUPS = 16
 
 
 @njit(cache=True, nogil=True, inline="always")
@@ -218,6 +220,93 @@ def _place(
         )
 
 
+@njit(cache=True, nogil=True, inline="always")
+def _cross_pixel(
+    screen: NDArray[np.float64],
+    corners: tuple[int, int, int],
+    view: tuple[float, float, float, float],
+    body_from_camera: Floats,
+    across: Floats,
+) -> int:
+    """The way across a pixel's surface where it is steepest, and how many look-ups it needs.
+
+    A pixel has an area: on a flank it sees a strip of the surface several times longer than wide,
+    and a look-up at its middle alone would show a pattern that is not there (aliasing).
+
+    Args:
+        screen: (V, 3) of `shade`.
+        corners: of the pixel's triangle.
+        view: x / z, y / z and z (mm) of the pixel's middle, focal length (px).
+        body_from_camera: (3, 4) float32.
+        across: (3,) float32 out: from edge to edge of the pixel, mm, in the body's frame.
+    """
+    a, b, c = corners
+    ray_x, ray_y, z, focal_px = view
+    ub, vb = screen[b, 0] - screen[a, 0], screen[b, 1] - screen[a, 1]
+    uc, vc = screen[c, 0] - screen[a, 0], screen[c, 1] - screen[a, 1]
+    wb, wc = screen[b, 2] - screen[a, 2], screen[c, 2] - screen[a, 2]
+    # 1 / z is linear in the picture. The gradient of z over z / f is the depth per way across.
+    scale = -z * focal_px / (ub * vc - uc * vb)
+    fall_u, fall_v = (wb * vc - wc * vb) * scale, (ub * wc - uc * wb) * scale
+    steepness = math.sqrt(fall_u * fall_u + fall_v * fall_v)
+    if steepness <= 1.0:
+        return 1
+    kept = min(steepness, float(_MOST_LOOKUPS))
+    width_mm = z / focal_px
+    x, y = fall_u / steepness * width_mm, fall_v / steepness * width_mm
+    depth = kept * width_mm
+    x, y = x + ray_x * depth, y + ray_y * depth
+    for k in range(3):
+        across[k] = (
+            body_from_camera[k, 0] * x + body_from_camera[k, 1] * y + body_from_camera[k, 2] * depth
+        )
+    return math.ceil(kept)
+
+
+@njit(cache=True, nogil=True)
+def sample_surface(
+    tile: NDArray[np.uint16],
+    voxels_per_mm: tuple[float, float],
+    texture: Floats,
+    point: Floats,
+    across: Floats,
+    lookups: int,
+    out: Floats,
+) -> None:
+    """Mean of the fine and of the coarse noise on a way across a pixel.
+
+    Args:
+        tile: of `sample_tile`.
+        voxels_per_mm: of the fine and of the coarse look-up.
+        texture: (4,) float32 sign of x and shift, mm.
+        point: (3,) float32 the way's middle, mm, in the body's frame.
+        across: (3,) float32 from its beginning to its end, likewise.
+        lookups: evenly spaced on it.
+        out: (3, 5) float32 out: fine and coarse as of `sample_tile`; the last row is overwritten.
+    """
+    fine_scale, coarse_scale = voxels_per_mm
+    out[:2] = float32(0.0)
+    share = float32(1.0) / float32(lookups)
+    for k in range(lookups):
+        t = (float32(k) + float32(0.5)) * share - float32(0.5)
+        x = (point[0] + t * across[0]) * texture[0] + texture[1]
+        y = point[1] + t * across[1] + texture[2]
+        z = point[2] + t * across[2] + texture[3]
+        # The block is contiguous along the picture's rows, for the cache.
+        sample_tile(tile, z * fine_scale, y * fine_scale, x * fine_scale, out[2])
+        for m in range(5):
+            out[0, m] += share * out[2, m]
+        sample_tile(
+            tile,
+            y * coarse_scale + float32(_SHIFT_X),
+            z * coarse_scale + float32(_SHIFT_Y),
+            x * coarse_scale + float32(_SHIFT_Z),
+            out[2],
+        )
+        for m in range(5):
+            out[1, m] += share * out[2, m]
+
+
 @njit(cache=True, nogil=True)
 def compute_light(
     lamps: Floats,
@@ -317,8 +406,8 @@ def shade(
         parts: (body_from_camera (P, 3, 4) float32, lamps (P, L, 4) float32 directions
             in body frames and strengths,
             texture (P, 4) float32: sign of x and shift of the texture).
-        surface: (materials (M, 23) float32, tile (n, n, n) uint16, ambient, constants (3,)
-            float32: fine and coarse voxels per mm, vignetting per px^2).
+        surface: (materials (M, 23) float32, tile (n, n, n) uint16, ambient, constants (4,)
+            float32: fine and coarse voxels per mm, vignetting per px^2, focal length in px).
         image: (H, W, 3) float32 out, BGR.
     """
     triangle, inverse_depth, occlusion, rays, box, stride = frame
@@ -329,7 +418,9 @@ def shade(
     # Reused by every pixel.
     weights, normal = np.empty(3, np.float32), np.empty(3, np.float32)
     point, eye = np.empty(3, np.float32), np.empty(3, np.float32)
-    fine, coarse = np.empty(5, np.float32), np.empty(5, np.float32)
+    noise, across = np.empty((3, 5), np.float32), np.zeros(3, np.float32)
+    fine, coarse = noise[0], noise[1]
+    voxels_per_mm, focal_px = (constants[0], constants[1]), constants[3]
     colour, sums = np.empty(5, np.float32), np.empty(2, np.float32)
     middle_x, middle_y = float32(0.5 * (image.shape[1] - 1)), float32(0.5 * (image.shape[0] - 1))
     for y in range(box[1], box[3]):
@@ -343,19 +434,9 @@ def shade(
             _corner_weights(screen, a, b, c, x, y, weights)
             z = one / inverse_depth[y, x]
             _place(body_from_camera, part, rays[y, x, 0], rays[y, x, 1], z, point, eye)
-            px = point[0] * texture[part, 0] + texture[part, 1]
-            py, pz = point[1] + texture[part, 2], point[2] + texture[part, 3]
-            scale = constants[0]
-            # The block is contiguous along the picture's rows, for the cache.
-            sample_tile(tile, pz * scale, py * scale, px * scale, fine)
-            scale = constants[1]
-            sample_tile(
-                tile,
-                py * scale + float32(_SHIFT_X),
-                pz * scale + float32(_SHIFT_Y),
-                px * scale + float32(_SHIFT_Z),
-                coarse,
-            )
+            view = (rays[y, x, 0], rays[y, x, 1], z, focal_px)
+            lookups = _cross_pixel(screen, (a, b, c), view, body_from_camera[part], across)
+            sample_surface(tile, voxels_per_mm, texture[part], point, across, lookups, noise)
             mark = _blend(attributes, a, b, c, 3, weights)
             compute_albedo(materials, row, fine, coarse, mark, colour)
             bump = materials[row, _BUMP] * (one - float32(0.6) * colour[4])

@@ -21,6 +21,18 @@ def sample(tile, point):
     return values, gradient
 
 
+def sample_surface(tile, point_mm, across_mm, lookups):
+    """Fine and coarse noise, each value and slope, as means over a way across a pixel."""
+    shift = np.array([41.3, 17.9, 73.1])
+    found = []
+    for t in (np.arange(lookups) + 0.5) / lookups - 0.5:
+        x, y, z = point_mm + t * across_mm
+        fine = sample(tile, np.array([z, y, x]) / 0.3)
+        coarse = sample(tile, np.array([y, z, x]) / 1.13 + shift)
+        found.append([np.concatenate(fine), np.concatenate(coarse)])
+    return np.mean(found, axis=0)
+
+
 def step(value):
     t = np.clip(value, 0.0, 1.0)
     return t * t * (3.0 - 2.0 * t)
@@ -63,11 +75,10 @@ def pixel(look, material, lamps, point, eye, mark):
     """B, G, R at a point whose smooth normal is -z or +z, whichever faces the eye."""
     tile = look.tile.values
     row = look.materials[material].astype(float)
-    values, slope = sample(tile, point[::-1] / 0.3)
-    shift = np.array([41.3, 17.9, 73.1])
-    coarse, _ = sample(tile, np.array([point[1], point[2], point[0]]) / 1.13 + shift)
-    *colour, wet, film = albedo(row, values, coarse, mark)
-    normal = np.array([0.0, 0.0, np.sign(eye[2])]) - row[14] * (1.0 - 0.6 * film) * slope[::-1]
+    fine, coarse = sample_surface(tile, point, np.zeros(3), 1)
+    *colour, wet, film = albedo(row, fine, coarse, mark)
+    tilt = row[14] * (1.0 - 0.6 * film) * fine[:1:-1]
+    normal = np.array([0.0, 0.0, np.sign(eye[2])]) - tilt
     normal /= np.linalg.norm(normal)
     diffuse, highlight = light(lamps, normal, point, eye, row[20], row[17])
     return np.array(colour) * (diffuse + look.ambient) + highlight * wet

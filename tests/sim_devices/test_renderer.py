@@ -184,6 +184,35 @@ def test_a_small_picture_agrees_with_the_reference():
         np.testing.assert_allclose(picture[v, u], expected, rtol=5e-3, atol=1e-3)
 
 
+@pytest.mark.parametrize("turn_deg", [60.0, 75.0, 82.0])
+def test_a_flank_looks_as_the_mean_of_a_finer_picture(turn_deg):
+    """A pixel has an area: pictures of nine times as many pixels, averaged, show the same."""
+    wide = Camera(
+        np.array([[1400.0, 0, 79.5], [0, 1400.0, 59.5], [0, 0, 1]]), np.zeros(5), 160, 120
+    )
+    part = Part("plate", disc(np.zeros(3), 150.0), MaterialId.BONE)
+    axis = np.array([0.8, 0.6, 0.0])
+    poses = {
+        "plate": RigidTransform.from_parts(
+            "camera", "plate", rotation_from_vector(np.radians(turn_deg) * axis), (0, 0, 450)
+        )
+    }
+    matt = surfaces(lamps=LAMPS * (1, 1, 1, 0), ambient=1.0, vignetting=0.0)
+    n = 9
+    matrix = np.diag([n, n, 1.0]) @ wide.matrix
+    matrix[:2, 2] += (n - 1) / 2
+    fine = Camera(matrix, np.zeros(5), n * wide.width, n * wide.height)
+    picture, finer = (
+        WithoutCrevices(camera, [part], matt).render(poses, NO_LAMPS)[..., 1]
+        for camera in (wide, fine)
+    )
+    mean = finer.reshape(wide.height, n, wide.width, n).mean(axis=(1, 3))
+    inside = slice(50, 70), slice(65, 95)
+    assert mean[inside].min() > 0.05
+    error = picture[inside] - mean[inside]
+    assert error.std() < 0.2 * mean[inside].std()
+
+
 def test_what_is_kept_gives_the_same_picture(femur, pinhole):
     wall = disc(np.array([0.0, 0.0, 480.0]), 300.0)
     parts = [Part("femur", femur, MaterialId.BONE), Part("drape", wall, MaterialId.DRAPE)]

@@ -1,6 +1,6 @@
 """The error budget of frames of a simulated knee, and of what cannot be seen."""
 
-from dataclasses import replace
+from dataclasses import astuple, replace
 
 import numpy as np
 import pytest
@@ -38,14 +38,18 @@ def budget_of(
 
 
 def test_each_step_is_further_off_than_noise_allows(world) -> None:
-    quiet, noisy = budget_of(world, QUIET, 0.3), budget_of(world, NOISY, 0.3)
-    for budget in (quiet, noisy):
-        assert 0.001 < budget.limit_mm < budget.matched_mm < 0.3
-        assert budget.ideal_mm < 0.1
-        assert budget.reached_mm == pytest.approx(0.3)
+    limits_mm = []
+    for sensor in (QUIET, NOISY):
+        # The limit is that of root mean squares: one frame can be lucky.
+        budgets = [astuple(budget_of(world, replace(sensor, seed=seed), 0.3)) for seed in (7, 8, 9)]
+        limit_mm, ideal_mm, matched_mm, reached_mm = np.sqrt(np.mean(np.square(budgets), axis=0))
+        assert 0.001 < limit_mm < matched_mm < 0.3
+        assert ideal_mm < 0.1
+        assert reached_mm == pytest.approx(0.3)
+        limits_mm.append(limit_mm)
     # A sixteenth of the light has four times the noise. More pixels stay within it, which tell
     # a little more.
-    assert 2.0 < noisy.limit_mm / quiet.limit_mm < 4.5
+    assert 2.0 < limits_mm[1] / limits_mm[0] < 4.5
 
 
 def test_of_dark_pictures_nothing_is_said(world) -> None:
