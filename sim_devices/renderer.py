@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from navapp.geometry.camera import Camera
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import RigidTransform
+from sim_devices.coverage_kernels import number_edges, raster_places
+from sim_devices.lamp_view import LampView, Surroundings
 from sim_devices.materials import MaterialId
 from sim_devices.pixel_rays import centre_rays
 from sim_devices.raster_kernels import project_vertices, raster_triangles
@@ -19,12 +21,6 @@ from sim_devices.shading_kernels import shade
 from sim_devices.textures import COARSE_VOXEL_MM, FINE_VOXEL_MM, NoiseTile
 
 FloatImage = NDArray[np.float32]
-
-# Pixels per cell of the coarse depth picture from which crevices are darkened.
-_OCCLUSION_STRIDE = 4
-_OCCLUSION_REACH_MM = 9.0
-_OCCLUSION_DEPTH_MM = 22.0
-_EMPTY_DEPTH_MM = 700.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -139,6 +135,13 @@ class Renderer:
         self._screen = np.zeros((len(self._geometry.attributes), 3))
         self._inverse_depth = np.zeros(shape, dtype=np.float32)
         self._triangle = np.full(shape, -1, dtype=np.int32)
+        self._edge = np.full(shape, -1, dtype=np.int32)  # number of a pixel with an edge
+        self._lamp_view = LampView(
+            self._geometry.vertices,
+            [part.mesh.faces for part in self._geometry.parts],
+            self._static,
+            surfaces.lamps,
+        )
         self._background: tuple[FloatImage, FloatImage, NDArray[np.int32]] | None = None
         self._background_poses = np.zeros(0)
         self._lock = threading.Lock()
@@ -158,16 +161,17 @@ class Renderer:
             image = image_kept.copy()
             box = self._project(poses, static=False)
             if box is not None:
-                # All of it, not only the box: crevices are found in the surroundings too, and
-                # no picture may depend on the one before.
+                # All of it, not only the box: no picture may depend on the one before.
                 self._inverse_depth[:] = inverse_depth_kept
                 # Static surfaces are in the picture already: only moving ones get a triangle.
                 self._triangle[box[1] : box[3], box[0] : box[2]] = -1
                 self._raster(box, static=False)
                 if rows is not None:
-                    box[1], box[3] = max(box[1], rows[0]), min(box[3], rows[1])
+                    # A row more on either side: an edge may lie between two rows.
+                    box[1], box[3] = max(box[1], rows[0] - 1), min(box[3], rows[1] + 1)
                 if box[1] < box[3]:
-                    self._shade(box, poses, camera_from_lamps, image)
+                    places = self._find_places(box, inverse_depth_kept, static=False)
+                    self._shade(box, poses, camera_from_lamps, places, image, static=False)
             return image
 
     def depth(
@@ -207,7 +211,8 @@ class Renderer:
             self._triangle.fill(-1)
             self._project(poses, static=True)
             self._raster(whole, static=True)
-            self._shade(whole, poses, camera_from_lamps, image)
+            places = self._find_places(whole, None, static=True)
+            self._shade(whole, poses, camera_from_lamps, places, image, static=True)
             self._background_poses = np.array(still)
             self._background = (image, self._inverse_depth.copy(), self._triangle.copy())
         return self._background
@@ -242,6 +247,32 @@ class Renderer:
                     self._screen, faces, first, box, self._inverse_depth, self._triangle
                 )
 
+    def _find_places(
+        self, box: NDArray[np.int64], kept: FloatImage | None, *, static: bool
+    ) -> tuple[NDArray[np.int32], FloatImage]:
+        """Triangle and 1 / z (K, 9) at the places of the pixels in the box that have an edge.
+
+        `kept` (H, W) is 1 / z of what was drawn before: its triangle is -1.
+        """
+        geometry = self._geometry
+        n_edges = number_edges(
+            self._triangle, self._inverse_depth, geometry.part_of_face,
+            geometry.material_of_face, box, self._camera.focal_px, self._edge,
+        )  # fmt: skip
+        triangle = np.full((n_edges, 9), -1, dtype=np.int32)
+        inverse_depth = np.zeros((n_edges, 9), dtype=np.float32)
+        if kept is not None:
+            inside = slice(box[1], box[3]), slice(box[0], box[2])
+            inverse_depth += kept[inside][self._edge[inside] >= 0][:, None]
+        for k in range(len(geometry.parts)):
+            if self._static[k] == static:
+                first, last = int(geometry.face_offsets[k]), int(geometry.face_offsets[k + 1])
+                raster_places(
+                    self._screen, geometry.faces[first:last], first, box, self._edge,
+                    inverse_depth, triangle,
+                )  # fmt: skip
+        return triangle, inverse_depth
+
     def _turn_lamps(
         self, body_from_camera: list[RigidTransform], camera_from_lamps: RigidTransform
     ) -> FloatImage:
@@ -259,9 +290,13 @@ class Renderer:
         box: NDArray[np.int64],
         poses: Mapping[str, RigidTransform],
         camera_from_lamps: RigidTransform,
+        places: tuple[NDArray[np.int32], FloatImage],
         image: FloatImage,
+        *,
+        static: bool,
     ) -> None:
         geometry, surfaces = self._geometry, self._surfaces
+        around = self._look_around(poses, camera_from_lamps, static=static)
         inverse = [poses[part.body].inverse() for part in geometry.parts]
         lamps = self._turn_lamps(inverse, camera_from_lamps)
         corner_px2 = 0.25 * (self._camera.width**2 + self._camera.height**2)
@@ -278,10 +313,10 @@ class Renderer:
             (
                 self._triangle,
                 self._inverse_depth,
-                self._occlusion(),
                 self._rays,
                 box,
-                np.float32(_OCCLUSION_STRIDE),
+                self._edge,
+                *places,
             ),
             (
                 self._screen,
@@ -295,26 +330,27 @@ class Renderer:
                 lamps,
                 geometry.texture,
             ),
-            (surfaces.materials, surfaces.tile.values, np.float32(surfaces.ambient), constants),
+            (
+                surfaces.materials,
+                surfaces.tile.values,
+                np.float32(surfaces.ambient),
+                constants,
+                around.depth_mm,
+                around.map_from_camera,
+            ),
             image,
         )
 
-    def _occlusion(self) -> FloatImage:
-        """Light left in crevices: pixels behind their surroundings' mean depth lose some.
-
-        Source: Luft, Colditz, Deussen, Image enhancement by unsharp masking the depth buffer
-        (SIGGRAPH 2006).
-        """
-        import cv2
-
-        coarse = np.ascontiguousarray(self._inverse_depth[::_OCCLUSION_STRIDE, ::_OCCLUSION_STRIDE])
-        depth = np.where(coarse > 0.0, 1.0 / np.maximum(coarse, 1e-6), _EMPTY_DEPTH_MM)
-        depth = depth.astype(np.float32)
-        reach_px = self._camera.focal_px / float(np.median(depth)) * _OCCLUSION_REACH_MM
-        sigma = max(0.8, reach_px / _OCCLUSION_STRIDE)
-        behind = depth - cv2.GaussianBlur(depth, (0, 0), sigma)
-        light: FloatImage = np.clip(1.0 - behind / _OCCLUSION_DEPTH_MM, 0.25, 1.0)
-        return light.astype(np.float32)
+    def _look_around(
+        self,
+        poses: Mapping[str, RigidTransform],
+        camera_from_lamps: RigidTransform,
+        *,
+        static: bool,
+    ) -> Surroundings:
+        """What crevices are told from. What lies still is not darkened by what moves."""
+        of_parts = [poses[part.body] for part in self._geometry.parts]
+        return self._lamp_view.draw(of_parts, camera_from_lamps, still=static)
 
 
 def _camera_numbers(camera: Camera) -> NDArray[np.float64]:

@@ -1,4 +1,4 @@
-"""Shading of the rastered picture: solid texture, lamps, wet highlights."""
+"""Shading of the rastered picture: solid texture, lamps, wet highlights, crevices."""
 
 import math
 from typing import Any
@@ -21,6 +21,8 @@ _LAMP_RADIUS, _LAMP_LIGHT = 0.13, 1.0 / 0.13**2
 # The swizzle and shift of the second lookup keep it unrelated to the first.
 _SHIFT_X, _SHIFT_Y, _SHIFT_Z = 41.3, 17.9, 73.1
 _INV_SIGMA = 1.0 / 40.0
+# A point so much deeper (mm) than its surroundings gets no light but what is left in any crevice.
+_DARK_BEHIND_MM, _LEAST_LIGHT = 22.0, 0.25
 # Look-ups of a pixel at most: of a surface that falls away by 16 mm per mm across, 86 degrees.
 _MOST_LOOKUPS = 16
 
@@ -156,9 +158,9 @@ def _bilinear(grid: Floats, x: float, y: float) -> Any:
 
 @njit(cache=True, nogil=True, inline="always")
 def _corner_weights(
-    screen: NDArray[np.float64], a: int, b: int, c: int, x: int, y: int, weights: Floats
+    screen: NDArray[np.float64], a: int, b: int, c: int, x: float, y: float, weights: Floats
 ) -> None:
-    """Perspective-correct weights of a triangle's corners at a pixel."""
+    """Perspective-correct weights of a triangle's corners at a place of the picture."""
     ua, va = screen[a, 0], screen[a, 1]
     ub, vb = screen[b, 0], screen[b, 1]
     uc, vc = screen[c, 0], screen[c, 1]
@@ -387,6 +389,21 @@ def compute_mirrored(
     return total + float32(0.08) + float32(0.9) * overhead * overhead
 
 
+@njit(cache=True, nogil=True, inline="always")
+def _open_light(
+    surroundings: Floats, map_from_camera: Floats, ray_x: float, ray_y: float, z: float
+) -> Any:
+    """Light that reaches a point between what stands around it, 0 to 1."""
+    x, y = ray_x * z, ray_y * z
+    m = map_from_camera
+    column = m[0, 0] * x + m[0, 1] * y + m[0, 2] * z + m[0, 3]
+    row = m[1, 0] * x + m[1, 1] * y + m[1, 2] * z + m[1, 3]
+    depth_mm = m[2, 0] * x + m[2, 1] * y + m[2, 2] * z + m[2, 3]
+    behind_mm = depth_mm - _bilinear(surroundings, column, row)
+    light = float32(1.0) - behind_mm * float32(1.0 / _DARK_BEHIND_MM)
+    return min(float32(1.0), max(float32(_LEAST_LIGHT), light))
+
+
 @njit(cache=True, nogil=True)
 def shade(
     frame: tuple[Any, ...],
@@ -395,64 +412,84 @@ def shade(
     surface: tuple[Any, ...],
     image: Floats,
 ) -> None:
-    """Colour every pixel of the box that shows a triangle.
+    """Colour every pixel of the box that shows a triangle, or a part of one.
 
     Args:
-        frame: (triangle (H, W) int32 with -1 for none, inverse_depth (H, W) float32, occlusion
-            (h, w) float32 on a grid of every `stride`-th pixel, rays (H, W, 2) float32,
-            box (4,) int64, stride).
+        frame: (triangle (H, W) int32 with -1 for none, inverse_depth (H, W) float32, rays
+            (H, W, 2) float32, box (4,) int64, and of the pixels with an edge (coverage_kernels):
+            number (H, W) int32, triangle (K, 9) int32 and inverse_depth (K, 9) float32 of their
+            places).
         geometry: (screen (V, 3) float64, faces (F, 3) int32, attributes (V, 5) float32: normal,
             mark, exposure; part_of_face (F,) uint8, material_of_face (F,) uint8).
         parts: (body_from_camera (P, 3, 4) float32, lamps (P, L, 4) float32 directions
             in body frames and strengths,
             texture (P, 4) float32: sign of x and shift of the texture).
         surface: (materials (M, 23) float32, tile (n, n, n) uint16, ambient, constants (4,)
-            float32: fine and coarse voxels per mm, vignetting per px^2, focal length in px).
-        image: (H, W, 3) float32 out, BGR.
+            float32: fine and coarse voxels per mm, vignetting per px^2, focal length in px;
+            surroundings (h, w) and map_from_camera (3, 4) float32 of lamp_view).
+        image: (H, W, 3) float32 in and out, BGR: what no triangle covers stays.
     """
-    triangle, inverse_depth, occlusion, rays, box, stride = frame
+    triangle, inverse_depth, rays, box, number, place_triangle, place_depth = frame
     screen, faces, attributes, part_of_face, material_of_face = geometry
     body_from_camera, lamps, texture = parts
-    materials, tile, ambient, constants = surface
-    one = float32(1.0)
-    # Reused by every pixel.
+    materials, tile, ambient, constants, surroundings, map_from_camera = surface
+    one, third = float32(1.0), float32(1.0 / 3.0)
+    voxels_per_mm, focal_px = (constants[0], constants[1]), constants[3]
+    # Reused by every place.
     weights, normal = np.empty(3, np.float32), np.empty(3, np.float32)
     point, eye = np.empty(3, np.float32), np.empty(3, np.float32)
     noise, across = np.empty((3, 5), np.float32), np.zeros(3, np.float32)
     fine, coarse = noise[0], noise[1]
-    voxels_per_mm, focal_px = (constants[0], constants[1]), constants[3]
     colour, sums = np.empty(5, np.float32), np.empty(2, np.float32)
+    total = np.empty(3, np.float32)
     middle_x, middle_y = float32(0.5 * (image.shape[1] - 1)), float32(0.5 * (image.shape[0] - 1))
     for y in range(box[1], box[3]):
         for x in range(box[0], box[2]):
-            if triangle[y, x] < 0:
-                continue
-            face = uint32(triangle[y, x])
-            a, b, c = uint32(faces[face, 0]), uint32(faces[face, 2]), uint32(faces[face, 1])
-            part = part_of_face[face]
-            row = material_of_face[face]
-            _corner_weights(screen, a, b, c, x, y, weights)
-            z = one / inverse_depth[y, x]
-            _place(body_from_camera, part, rays[y, x, 0], rays[y, x, 1], z, point, eye)
-            view = (rays[y, x, 0], rays[y, x, 1], z, focal_px)
-            lookups = _cross_pixel(screen, (a, b, c), view, body_from_camera[part], across)
-            sample_surface(tile, voxels_per_mm, texture[part], point, across, lookups, noise)
-            mark = _blend(attributes, a, b, c, 3, weights)
-            compute_albedo(materials, row, fine, coarse, mark, colour)
-            bump = materials[row, _BUMP] * (one - float32(0.6) * colour[4])
-            _bump_normal(attributes, a, b, c, weights, bump, texture[part, 0], fine, normal)
-            wrap, shininess = materials[row, _WRAP], materials[row, _SHININESS]
-            compute_light(lamps, part, normal, point, eye, wrap, shininess, sums)
-            exposure = _blend(attributes, a, b, c, 4, weights)
-            exposure *= _bilinear(occlusion, float32(x) / stride, float32(y) / stride)
+            edge = number[y, x]
+            n_places, n_covered = (1, 0) if edge < 0 else (9, 0)
+            total[:] = float32(0.0)
             dx, dy = float32(x) - middle_x, float32(y) - middle_y
-            exposure *= one - constants[2] * (dx * dx + dy * dy)
-            diffuse = (sums[0] + ambient) * exposure
-            highlight = sums[1] * colour[3] * exposure
-            if materials[row, _MIRROR] > float32(0.0):
-                rough = materials[row, _ROUGHNESS]
-                mirrored = compute_mirrored(lamps, part, normal, point, eye, rough)
-                # Blood hides the mirror below it.
-                highlight += materials[row, _MIRROR] * (one - colour[4]) * mirrored * exposure
-            for k in range(3):
-                image[y, x, k] = colour[k] * diffuse + highlight
+            left = one - constants[2] * (dx * dx + dy * dy)
+            for m in range(n_places):
+                if edge < 0:
+                    shown, inverse_z, du, dv = triangle[y, x], inverse_depth[y, x], 0.0, 0.0
+                else:
+                    shown, inverse_z = place_triangle[edge, m], place_depth[edge, m]
+                    du, dv = (m % 3 - 1) * third, (m // 3 - 1) * third
+                if shown < 0:
+                    continue
+                n_covered += 1
+                face = uint32(shown)
+                a, b, c = uint32(faces[face, 0]), uint32(faces[face, 2]), uint32(faces[face, 1])
+                part, row = part_of_face[face], material_of_face[face]
+                _corner_weights(screen, a, b, c, x + du, y + dv, weights)
+                z = one / inverse_z
+                ray_x = rays[y, x, 0] + float32(du) / focal_px
+                ray_y = rays[y, x, 1] + float32(dv) / focal_px
+                _place(body_from_camera, part, ray_x, ray_y, z, point, eye)
+                lookups = 1
+                if edge < 0:
+                    view = (ray_x, ray_y, z, focal_px)
+                    lookups = _cross_pixel(screen, (a, b, c), view, body_from_camera[part], across)
+                sample_surface(tile, voxels_per_mm, texture[part], point, across, lookups, noise)
+                mark = _blend(attributes, a, b, c, 3, weights)
+                compute_albedo(materials, row, fine, coarse, mark, colour)
+                bump = materials[row, _BUMP] * (one - float32(0.6) * colour[4])
+                _bump_normal(attributes, a, b, c, weights, bump, texture[part, 0], fine, normal)
+                wrap, shininess = materials[row, _WRAP], materials[row, _SHININESS]
+                compute_light(lamps, part, normal, point, eye, wrap, shininess, sums)
+                exposure = left * _blend(attributes, a, b, c, 4, weights)
+                exposure *= _open_light(surroundings, map_from_camera, ray_x, ray_y, z)
+                diffuse = (sums[0] + ambient) * exposure
+                highlight = sums[1] * colour[3] * exposure
+                if materials[row, _MIRROR] > float32(0.0):
+                    rough = materials[row, _ROUGHNESS]
+                    mirrored = compute_mirrored(lamps, part, normal, point, eye, rough)
+                    # Blood hides the mirror below it.
+                    highlight += materials[row, _MIRROR] * (one - colour[4]) * mirrored * exposure
+                for k in range(3):
+                    total[k] += colour[k] * diffuse + highlight
+            if n_covered > 0:
+                kept = float32(n_places - n_covered)
+                for k in range(3):
+                    image[y, x, k] = (total[k] + kept * image[y, x, k]) / float32(n_places)

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -21,8 +23,9 @@ POSE = RigidTransform.from_parts(
 class WithoutCrevices(Renderer):
     """A renderer that darkens no crevices."""
 
-    def _occlusion(self):
-        return np.ones_like(super()._occlusion())
+    def _look_around(self, *given, **options):
+        around = super()._look_around(*given, **options)
+        return replace(around, depth_mm=np.full_like(around.depth_mm, 1e6))
 
 
 def surfaces(**changes):
@@ -44,6 +47,13 @@ def pinhole():
     return Camera(
         np.array([[700.0, 0, 321.3], [0, 702.0, 178.8], [0, 0, 1]]), np.zeros(5), 640, 360
     )
+
+
+def without_rim(mask):
+    """Of a mask (H, W) what has no pixel of something else, nor the picture's edge, beside it."""
+    padded = np.pad(mask, 1)
+    h, w = mask.shape
+    return np.all([padded[y : y + h, x : x + w] for y in range(3) for x in range(3)], axis=0)
 
 
 def disc(centre, radius):
@@ -162,7 +172,7 @@ def test_a_small_picture_agrees_with_the_reference():
     renderer = WithoutCrevices(camera, [part], look)
     picture = renderer.render({"plate": pose}, NO_LAMPS)
     depth = renderer.depth({"plate": pose}, NO_LAMPS)
-    seen = np.argwhere(depth.body == 0)
+    seen = np.argwhere(without_rim(depth.body == 0))
     assert len(seen) > 100
     lamps = np.array(LAMPS)
     lamps[:, :3] /= np.linalg.norm(lamps[:, :3], axis=1, keepdims=True)
@@ -213,6 +223,61 @@ def test_a_flank_looks_as_the_mean_of_a_finer_picture(turn_deg):
     assert error.std() < 0.2 * mean[inside].std()
 
 
+def test_an_edge_looks_as_the_mean_of_a_finer_picture(femur, pinhole):
+    """As far as it lies before what does not move, and before nothing."""
+    n, half = 5, pinhole.scale(0.5)
+    wall = disc(np.array([0.0, 0.0, 480.0]), 100.0)
+    parts = [Part("femur", femur, MaterialId.BONE), Part("drape", wall, MaterialId.DRAPE)]
+    poses = {"femur": POSE, "drape": RigidTransform.identity("camera", "drape")}
+    matrix = np.diag([n, n, 1.0]) @ half.matrix
+    matrix[:2, 2] += (n - 1) / 2
+    fine = Camera(matrix, np.zeros(5), n * half.width, n * half.height)
+    matt = surfaces(lamps=LAMPS * (1, 1, 1, 0), ambient=1.0, vignetting=0.0)
+    picture, finer = (
+        WithoutCrevices(camera, parts, matt, frozenset({"drape"})).render(poses, NO_LAMPS)[..., 1]
+        for camera in (half, fine)
+    )
+    mean = finer.reshape(half.height, n, half.width, n).mean(axis=(1, 3))
+    body = Renderer(half, parts, matt).depth(poses, NO_LAMPS).body
+    rims = [~without_rim(body == k) & ~without_rim(body != k) for k in (0, 1)]
+    for rim in rims:
+        assert rim.sum() > 150
+        assert np.abs(picture - mean)[rim].mean() < 0.04 * mean[rim].std()
+
+
+def test_a_crevice_is_as_dark_to_one_eye_as_to_the_other(femur):
+    rig = make_default_rig()
+    plain = surfaces(lamps=LAMPS * (1, 1, 1, 0), ambient=1.0, vignetting=0.0)
+    wall = disc(np.array([0.0, 0.0, 470.0]), 200.0)
+    parts = [Part("femur", femur, MaterialId.BONE), Part("drape", wall, MaterialId.BONE)]
+    right_from_left = rig.right_from_left.rename("camera", "camera")
+    light = []
+    for camera, seen_from in ((rig.left, NO_LAMPS), (rig.right, right_from_left)):
+        poses = {"femur": POSE, "drape": RigidTransform.identity("camera", "drape")}
+        poses = {
+            body: right_from_left @ pose if camera is rig.right else pose
+            for body, pose in poses.items()
+        }
+        lit, unlit = (
+            kind(camera, parts, plain).render(poses, seen_from)[..., 1]
+            for kind in (Renderer, WithoutCrevices)
+        )
+        depth = Renderer(camera, parts, plain).depth(poses, seen_from)
+        light.append((lit / np.maximum(unlit, 1e-6), depth.depth_mm, without_rim(depth.body == 0)))
+    left, depth_mm, is_bone = light[0]
+    v, u = (index[::37] for index in np.nonzero(is_bone))
+    points = rig.left.rays(np.column_stack([u, v])) * depth_mm[v, u][:, None].astype(float)
+    seen = right_from_left.apply(points)
+    pixel = rig.right.project(seen)
+    column, row = np.rint(pixel).astype(int).T
+    right, right_mm, is_bone = light[1]
+    visible = is_bone[row, column] & (np.abs(right_mm[row, column] - seen[:, 2]) < 0.3)
+    assert visible.sum() > 500
+    assert left[v, u].min() < 0.8
+    apart = np.abs(bilinear(right, pixel[visible]) - left[v, u][visible])
+    assert np.percentile(apart, 95) < 0.01
+
+
 def test_what_is_kept_gives_the_same_picture(femur, pinhole):
     wall = disc(np.array([0.0, 0.0, 480.0]), 300.0)
     parts = [Part("femur", femur, MaterialId.BONE), Part("drape", wall, MaterialId.DRAPE)]
@@ -222,8 +287,9 @@ def test_what_is_kept_gives_the_same_picture(femur, pinhole):
     aside = poses | {"femur": POSE.move((60.0, 20.0, 0, 0, 0, 0), POSE.translation_mm)}
     kept.render(aside, NO_LAMPS)
     bone = fresh.depth(poses, NO_LAMPS).body == 0
-    picture = kept.render(poses, NO_LAMPS)
-    np.testing.assert_array_equal(picture[bone], fresh.render(poses, NO_LAMPS)[bone])
+    inside, outside = without_rim(bone), without_rim(~bone)
+    picture, at_once = kept.render(poses, NO_LAMPS), fresh.render(poses, NO_LAMPS)
+    np.testing.assert_array_equal(picture[inside], at_once[inside])
     np.testing.assert_array_equal(
         kept.depth(poses, NO_LAMPS).depth_mm, fresh.depth(poses, NO_LAMPS).depth_mm
     )
@@ -235,4 +301,4 @@ def test_what_is_kept_gives_the_same_picture(femur, pinhole):
         },
         NO_LAMPS,
     )
-    np.testing.assert_array_equal(picture[~bone], empty[~bone])
+    np.testing.assert_array_equal(picture[outside], empty[outside])

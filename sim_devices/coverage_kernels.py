@@ -1,0 +1,127 @@
+"""Pixels with an edge in them: which surface each of their nine places shows.
+
+A pixel has an area. One look at its middle would move an edge by up to half a pixel, in each eye
+another way. Only pixels with an edge are looked at in nine places, a third of a pixel apart.
+"""
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+# Two neighbours of one surface are so many times further apart in depth than across where it may
+# end between them: 76 degrees.
+_STEEPEST = 4.0
+_BARELY = 1e-12
+
+
+@njit(cache=True, nogil=True)
+def number_edges(
+    triangle: NDArray[np.int32],
+    inverse_depth: NDArray[np.float32],
+    part_of_face: NDArray[np.uint8],
+    material_of_face: NDArray[np.uint8],
+    box: NDArray[np.int64],
+    focal_px: float,
+    number: NDArray[np.int32],
+) -> int:
+    """Number the pixels of a box that one of their eight neighbours differs from; how many.
+
+    It differs in part, material, or by a jump in depth.
+
+    Args:
+        triangle: (H, W) int32, -1 for none.
+        inverse_depth: (H, W) float32 per mm.
+        part_of_face: (F,) uint8.
+        material_of_face: (F,) uint8.
+        box: (4,) int64 x0, y0, x1, y1; neighbours beside it do not count.
+        focal_px: mean focal length.
+        number: (H, W) int32 out: 0 .. n - 1 row by row, -1 elsewhere in the box.
+    """
+    x0, y0, x1, y1 = box[0], box[1], box[2], box[3]
+    number[y0:y1, x0:x1] = -1
+    for y in range(y0, y1):
+        for x in range(x0, x1):
+            here = triangle[y, x]
+            # The neighbours before it have looked at it.
+            for k in range(4):
+                u, v = x + (1 if k < 2 else k - 3), y + (0 if k == 0 else 1)
+                if u < x0 or u >= x1 or v >= y1 or triangle[v, u] == here:
+                    continue
+                there = triangle[v, u]
+                is_edge = (
+                    here < 0
+                    or there < 0
+                    or part_of_face[here] != part_of_face[there]
+                    or material_of_face[here] != material_of_face[there]
+                )
+                if not is_edge:
+                    # z2 - z1 over z1 / f
+                    apart = focal_px * (inverse_depth[y, x] / inverse_depth[v, u] - 1.0)
+                    is_edge = abs(apart) > _STEEPEST
+                if is_edge:
+                    number[y, x] = number[v, u] = 0
+    n = 0
+    for y in range(y0, y1):
+        for x in range(x0, x1):
+            if number[y, x] == 0:
+                number[y, x] = n
+                n += 1
+    return n
+
+
+@njit(cache=True, nogil=True)
+def raster_places(
+    screen: NDArray[np.float64],
+    faces: NDArray[np.int32],
+    first_id: int,
+    box: NDArray[np.int64],
+    number: NDArray[np.int32],
+    inverse_depth: NDArray[np.float32],
+    triangle: NDArray[np.int32],
+) -> None:
+    """As `raster_triangles`, but into the nine places of the numbered pixels.
+
+    Args:
+        screen: (V, 3) of `raster_triangles`.
+        faces: (F, 3) likewise.
+        first_id: likewise.
+        box: (4,) likewise.
+        number: (H, W) int32 of `number_edges`.
+        inverse_depth: (K, 9) float32 in and out; place m lies (m % 3 - 1) / 3 px right of the
+            pixel's middle and (m // 3 - 1) / 3 px below.
+        triangle: (K, 9) int32 in and out.
+    """
+    third = 1.0 / 3.0
+    for f in range(faces.shape[0]):
+        a, b, c = faces[f, 0], faces[f, 2], faces[f, 1]
+        wa, wb, wc = screen[a, 2], screen[b, 2], screen[c, 2]
+        if wa <= 0.0 or wb <= 0.0 or wc <= 0.0:
+            continue
+        ua, va = screen[a, 0], screen[a, 1]
+        ub, vb = screen[b, 0], screen[b, 1]
+        uc, vc = screen[c, 0], screen[c, 1]
+        area = (ub - ua) * (vc - va) - (vb - va) * (uc - ua)
+        if area <= _BARELY:
+            continue
+        u_low, u_high = min(ua, ub, uc) - third, max(ua, ub, uc) + third
+        v_low, v_high = min(va, vb, vc) - third, max(va, vb, vc) + third
+        if u_high < box[0] or u_low > box[2] - 1 or v_high < box[1] or v_low > box[3] - 1:
+            continue
+        x0, y0 = max(box[0], int(np.ceil(u_low))), max(box[1], int(np.ceil(v_low)))
+        x1, y1 = min(box[2] - 1, int(np.floor(u_high))), min(box[3] - 1, int(np.floor(v_high)))
+        scale = 1.0 / area
+        for y in range(y0, y1 + 1):
+            for x in range(x0, x1 + 1):
+                edge = number[y, x]
+                if edge < 0:
+                    continue
+                for m in range(9):
+                    u, v = x + (m % 3 - 1) * third, y + (m // 3 - 1) * third
+                    ba = ((uc - ub) * (v - vb) - (vc - vb) * (u - ub)) * scale
+                    bb = ((ua - uc) * (v - vc) - (va - vc) * (u - uc)) * scale
+                    if ba < -_BARELY or bb < -_BARELY or ba + bb > 1.0 + _BARELY:
+                        continue
+                    w = wc + ba * (wa - wc) + bb * (wb - wc)
+                    if w > inverse_depth[edge, m]:
+                        inverse_depth[edge, m] = w
+                        triangle[edge, m] = first_id + f
