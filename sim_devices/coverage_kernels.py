@@ -4,12 +4,13 @@ A pixel has an area. One look at its middle would move an edge by up to half a p
 another way. Only pixels with an edge are looked at in nine places, a third of a pixel apart.
 """
 
+import math
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-# Two neighbours of one surface are so many times further apart in depth than across where it may
-# end between them: 76 degrees.
+# A depth step of more pixel widths than this, per pixel between, counts as an edge: 76 degrees.
 _STEEPEST = 4.0
 _BARELY = 1e-12
 
@@ -22,7 +23,7 @@ def number_edges(
     material_of_face: NDArray[np.uint8],
     box: NDArray[np.int64],
     focal_px: float,
-    number: NDArray[np.int32],
+    edge_number: NDArray[np.int32],
 ) -> int:
     """Number the pixels of a box that one of their eight neighbours differs from; how many.
 
@@ -35,10 +36,10 @@ def number_edges(
         material_of_face: (F,) uint8.
         box: (4,) int64 x0, y0, x1, y1; neighbours beside it do not count.
         focal_px: mean focal length.
-        number: (H, W) int32 out: 0 .. n - 1 row by row, -1 elsewhere in the box.
+        edge_number: (H, W) int32 out: 0 .. n - 1 row by row, -1 elsewhere in the box.
     """
     x0, y0, x1, y1 = box[0], box[1], box[2], box[3]
-    number[y0:y1, x0:x1] = -1
+    edge_number[y0:y1, x0:x1] = -1
     for y in range(y0, y1):
         for x in range(x0, x1):
             here = triangle[y, x]
@@ -55,16 +56,17 @@ def number_edges(
                     or material_of_face[here] != material_of_face[there]
                 )
                 if not is_edge:
-                    # z2 - z1 over z1 / f
-                    apart = focal_px * (inverse_depth[y, x] / inverse_depth[v, u] - 1.0)
-                    is_edge = abs(apart) > _STEEPEST
+                    # (far - near) over the near pixel's width, near / focal_px.
+                    w1, w2 = inverse_depth[y, x], inverse_depth[v, u]
+                    step = focal_px * (max(w1, w2) / min(w1, w2) - 1.0)
+                    is_edge = step > _STEEPEST * (math.sqrt(2.0) if k == 1 or k == 2 else 1.0)
                 if is_edge:
-                    number[y, x] = number[v, u] = 0
+                    edge_number[y, x] = edge_number[v, u] = 0
     n = 0
     for y in range(y0, y1):
         for x in range(x0, x1):
-            if number[y, x] == 0:
-                number[y, x] = n
+            if edge_number[y, x] == 0:
+                edge_number[y, x] = n
                 n += 1
     return n
 
@@ -75,7 +77,7 @@ def raster_places(
     faces: NDArray[np.int32],
     first_id: int,
     box: NDArray[np.int64],
-    number: NDArray[np.int32],
+    edge_number: NDArray[np.int32],
     inverse_depth: NDArray[np.float32],
     triangle: NDArray[np.int32],
 ) -> None:
@@ -86,7 +88,7 @@ def raster_places(
         faces: (F, 3) likewise.
         first_id: likewise.
         box: (4,) likewise.
-        number: (H, W) int32 of `number_edges`.
+        edge_number: (H, W) int32 of `number_edges`.
         inverse_depth: (K, 9) float32 in and out; place m lies (m % 3 - 1) / 3 px right of the
             pixel's middle and (m // 3 - 1) / 3 px below.
         triangle: (K, 9) int32 in and out.
@@ -112,7 +114,7 @@ def raster_places(
         scale = 1.0 / area
         for y in range(y0, y1 + 1):
             for x in range(x0, x1 + 1):
-                edge = number[y, x]
+                edge = edge_number[y, x]
                 if edge < 0:
                     continue
                 for m in range(9):

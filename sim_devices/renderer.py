@@ -135,7 +135,7 @@ class Renderer:
         self._screen = np.zeros((len(self._geometry.attributes), 3))
         self._inverse_depth = np.zeros(shape, dtype=np.float32)
         self._triangle = np.full(shape, -1, dtype=np.int32)
-        self._edge = np.full(shape, -1, dtype=np.int32)  # number of a pixel with an edge
+        self._edge_number = np.full(shape, -1, dtype=np.int32)  # number of a pixel with an edge
         self._lamp_view = LampView(
             self._geometry.vertices,
             [part.mesh.faces for part in self._geometry.parts],
@@ -157,20 +157,23 @@ class Renderer:
         With `rows` only these are right: the others lack what moves.
         """
         with self._lock:
-            image_kept, inverse_depth_kept, _ = self._render_background(poses, camera_from_lamps)
+            image_kept, inverse_depth_kept, triangle_kept = self._render_background(
+                poses, camera_from_lamps
+            )
             image = image_kept.copy()
             box = self._project(poses, static=False)
             if box is not None:
                 # All of it, not only the box: no picture may depend on the one before.
                 self._inverse_depth[:] = inverse_depth_kept
-                # Static surfaces are in the picture already: only moving ones get a triangle.
-                self._triangle[box[1] : box[3], box[0] : box[2]] = -1
+                self._triangle[:] = triangle_kept
                 self._raster(box, static=False)
                 if rows is not None:
                     # A row more on either side: an edge may lie between two rows.
                     box[1], box[3] = max(box[1], rows[0] - 1), min(box[3], rows[1] + 1)
                 if box[1] < box[3]:
-                    places = self._find_places(box, inverse_depth_kept, static=False)
+                    places = self._find_places(box)
+                    # Static surfaces are in the picture already; only at edges are they anew.
+                    self._triangle[self._triangle == triangle_kept] = -1
                     self._shade(box, poses, camera_from_lamps, places, image, static=False)
             return image
 
@@ -209,9 +212,10 @@ class Renderer:
             image = np.zeros((self._camera.height, self._camera.width, 3), dtype=np.float32)
             self._inverse_depth.fill(0.0)
             self._triangle.fill(-1)
+            self._screen.fill(0.0)  # moving parts are behind the camera: not seen
             self._project(poses, static=True)
             self._raster(whole, static=True)
-            places = self._find_places(whole, None, static=True)
+            places = self._find_places(whole)
             self._shade(whole, poses, camera_from_lamps, places, image, static=True)
             self._background_poses = np.array(still)
             self._background = (image, self._inverse_depth.copy(), self._triangle.copy())
@@ -247,30 +251,18 @@ class Renderer:
                     self._screen, faces, first, box, self._inverse_depth, self._triangle
                 )
 
-    def _find_places(
-        self, box: NDArray[np.int64], kept: FloatImage | None, *, static: bool
-    ) -> tuple[NDArray[np.int32], FloatImage]:
-        """Triangle and 1 / z (K, 9) at the places of the pixels in the box that have an edge.
-
-        `kept` (H, W) is 1 / z of what was drawn before: its triangle is -1.
-        """
+    def _find_places(self, box: NDArray[np.int64]) -> tuple[NDArray[np.int32], FloatImage]:
+        """Triangle and 1 / z (K, 9) at the places of the pixels in the box that have an edge."""
         geometry = self._geometry
         n_edges = number_edges(
             self._triangle, self._inverse_depth, geometry.part_of_face,
-            geometry.material_of_face, box, self._camera.focal_px, self._edge,
+            geometry.material_of_face, box, self._camera.focal_px, self._edge_number,
         )  # fmt: skip
         triangle = np.full((n_edges, 9), -1, dtype=np.int32)
         inverse_depth = np.zeros((n_edges, 9), dtype=np.float32)
-        if kept is not None:
-            inside = slice(box[1], box[3]), slice(box[0], box[2])
-            inverse_depth += kept[inside][self._edge[inside] >= 0][:, None]
-        for k in range(len(geometry.parts)):
-            if self._static[k] == static:
-                first, last = int(geometry.face_offsets[k]), int(geometry.face_offsets[k + 1])
-                raster_places(
-                    self._screen, geometry.faces[first:last], first, box, self._edge,
-                    inverse_depth, triangle,
-                )  # fmt: skip
+        raster_places(
+            self._screen, geometry.faces, 0, box, self._edge_number, inverse_depth, triangle
+        )
         return triangle, inverse_depth
 
     def _turn_lamps(
@@ -296,7 +288,7 @@ class Renderer:
         static: bool,
     ) -> None:
         geometry, surfaces = self._geometry, self._surfaces
-        around = self._look_around(poses, camera_from_lamps, static=static)
+        surroundings = self._find_surroundings(poses, camera_from_lamps, static=static)
         inverse = [poses[part.body].inverse() for part in geometry.parts]
         lamps = self._turn_lamps(inverse, camera_from_lamps)
         corner_px2 = 0.25 * (self._camera.width**2 + self._camera.height**2)
@@ -315,7 +307,7 @@ class Renderer:
                 self._inverse_depth,
                 self._rays,
                 box,
-                self._edge,
+                self._edge_number,
                 *places,
             ),
             (
@@ -335,22 +327,22 @@ class Renderer:
                 surfaces.tile.values,
                 np.float32(surfaces.ambient),
                 constants,
-                around.depth_mm,
-                around.map_from_camera,
+                surroundings.depth_mm,
+                surroundings.map_from_camera,
             ),
             image,
         )
 
-    def _look_around(
+    def _find_surroundings(
         self,
         poses: Mapping[str, RigidTransform],
         camera_from_lamps: RigidTransform,
         *,
         static: bool,
     ) -> Surroundings:
-        """What crevices are told from. What lies still is not darkened by what moves."""
+        """Mean depths that crevices are measured against; static parts ignore moving ones."""
         of_parts = [poses[part.body] for part in self._geometry.parts]
-        return self._lamp_view.draw(of_parts, camera_from_lamps, still=static)
+        return self._lamp_view.draw(of_parts, camera_from_lamps, static=static)
 
 
 def _camera_numbers(camera: Camera) -> NDArray[np.float64]:

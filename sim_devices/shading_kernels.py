@@ -412,13 +412,13 @@ def shade(
     surface: tuple[Any, ...],
     image: Floats,
 ) -> None:
-    """Colour every pixel of the box that shows a triangle, or a part of one.
+    """Colour every pixel of the box that shows a triangle or has an edge; places of none are black.
 
     Args:
         frame: (triangle (H, W) int32 with -1 for none, inverse_depth (H, W) float32, rays
             (H, W, 2) float32, box (4,) int64, and of the pixels with an edge (coverage_kernels):
-            number (H, W) int32, triangle (K, 9) int32 and inverse_depth (K, 9) float32 of their
-            places).
+            edge_number (H, W) int32, triangle (K, 9) int32 and inverse_depth (K, 9) float32 of
+            their places).
         geometry: (screen (V, 3) float64, faces (F, 3) int32, attributes (V, 5) float32: normal,
             mark, exposure; part_of_face (F,) uint8, material_of_face (F,) uint8).
         parts: (body_from_camera (P, 3, 4) float32, lamps (P, L, 4) float32 directions
@@ -427,9 +427,9 @@ def shade(
         surface: (materials (M, 23) float32, tile (n, n, n) uint16, ambient, constants (4,)
             float32: fine and coarse voxels per mm, vignetting per px^2, focal length in px;
             surroundings (h, w) and map_from_camera (3, 4) float32 of lamp_view).
-        image: (H, W, 3) float32 in and out, BGR: what no triangle covers stays.
+        image: (H, W, 3) float32 in and out, BGR: other pixels stay.
     """
-    triangle, inverse_depth, rays, box, number, place_triangle, place_depth = frame
+    triangle, inverse_depth, rays, box, edge_number, place_triangle, place_depth = frame
     screen, faces, attributes, part_of_face, material_of_face = geometry
     body_from_camera, lamps, texture = parts
     materials, tile, ambient, constants, surroundings, map_from_camera = surface
@@ -445,11 +445,13 @@ def shade(
     middle_x, middle_y = float32(0.5 * (image.shape[1] - 1)), float32(0.5 * (image.shape[0] - 1))
     for y in range(box[1], box[3]):
         for x in range(box[0], box[2]):
-            edge = number[y, x]
-            n_places, n_covered = (1, 0) if edge < 0 else (9, 0)
+            edge = edge_number[y, x]
+            if edge < 0 and triangle[y, x] < 0:
+                continue
+            n_places = 1 if edge < 0 else 9
             total[:] = float32(0.0)
             dx, dy = float32(x) - middle_x, float32(y) - middle_y
-            left = one - constants[2] * (dx * dx + dy * dy)
+            vignette = one - constants[2] * (dx * dx + dy * dy)
             for m in range(n_places):
                 if edge < 0:
                     shown, inverse_z, du, dv = triangle[y, x], inverse_depth[y, x], 0.0, 0.0
@@ -458,7 +460,6 @@ def shade(
                     du, dv = (m % 3 - 1) * third, (m // 3 - 1) * third
                 if shown < 0:
                     continue
-                n_covered += 1
                 face = uint32(shown)
                 a, b, c = uint32(faces[face, 0]), uint32(faces[face, 2]), uint32(faces[face, 1])
                 part, row = part_of_face[face], material_of_face[face]
@@ -478,7 +479,7 @@ def shade(
                 _bump_normal(attributes, a, b, c, weights, bump, texture[part, 0], fine, normal)
                 wrap, shininess = materials[row, _WRAP], materials[row, _SHININESS]
                 compute_light(lamps, part, normal, point, eye, wrap, shininess, sums)
-                exposure = left * _blend(attributes, a, b, c, 4, weights)
+                exposure = vignette * _blend(attributes, a, b, c, 4, weights)
                 exposure *= _open_light(surroundings, map_from_camera, ray_x, ray_y, z)
                 diffuse = (sums[0] + ambient) * exposure
                 highlight = sums[1] * colour[3] * exposure
@@ -489,7 +490,5 @@ def shade(
                     highlight += materials[row, _MIRROR] * (one - colour[4]) * mirrored * exposure
                 for k in range(3):
                     total[k] += colour[k] * diffuse + highlight
-            if n_covered > 0:
-                kept = float32(n_places - n_covered)
-                for k in range(3):
-                    image[y, x, k] = (total[k] + kept * image[y, x, k]) / float32(n_places)
+            for k in range(3):
+                image[y, x, k] = total[k] / float32(n_places)

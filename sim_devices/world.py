@@ -286,7 +286,7 @@ class World:
     def _poses(
         self, seen_from: RigidTransform, state: State, time_ns: int
     ) -> tuple[dict[str, RigidTransform], RigidTransform]:
-        """camera_from_body of everything in the scene, and camera_from_table."""
+        """camera_from_body of all that is in the scene, and camera_from_table of the still step."""
         step_ns = self._still_step_ns
         still_ns = round(time_ns / step_ns) * step_ns
         poses = {
@@ -294,7 +294,7 @@ class World:
             @ self._left_from_body(body, still_ns if body in STILL else time_ns, state)
             for body in self._bodies_of(state)
         }
-        left_from_rest = self._shake.left_from_rest(time_ns / 1e9)
+        left_from_rest = self._shake.left_from_rest(still_ns / 1e9)
         return poses, seen_from @ left_from_rest @ self._left_from_table
 
     def _bodies_of(self, state: State) -> tuple[str, ...]:

@@ -15,11 +15,8 @@ def find_edges(triangle, inverse_depth, part_of_face, material_of_face, focal_px
             is_edge[y, x] = (surface[around] != surface[y, x]).any()
             if surface[y, x] >= 0 and not is_edge[y, x]:
                 ratio = inverse_depth[y, x] / inverse_depth[around]
-                # The nearer of two says how wide a pixel is there, whichever is asked.
-                first = np.zeros(ratio.shape, dtype=bool)
-                first[: (1 if y > 0 else 0)] = True
-                row = 1 if y > 0 else 0
-                first[row, : (1 if x > 0 else 0)] = True
-                apart = np.where(first, 1.0 / ratio - 1.0, ratio - 1.0)
-                is_edge[y, x] = (focal_px * np.abs(apart) > 4.0).any()
+                rows, columns = np.mgrid[around]
+                distance_px = np.hypot(rows - y, columns - x)
+                step = focal_px * (np.maximum(ratio, 1.0 / ratio) - 1.0)
+                is_edge[y, x] = (step > 4.0 * distance_px).any()
     return is_edge

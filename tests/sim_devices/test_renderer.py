@@ -23,9 +23,9 @@ POSE = RigidTransform.from_parts(
 class WithoutCrevices(Renderer):
     """A renderer that darkens no crevices."""
 
-    def _look_around(self, *given, **options):
-        around = super()._look_around(*given, **options)
-        return replace(around, depth_mm=np.full_like(around.depth_mm, 1e6))
+    def _find_surroundings(self, *given, **options):
+        surroundings = super()._find_surroundings(*given, **options)
+        return replace(surroundings, depth_mm=np.full_like(surroundings.depth_mm, 1e6))
 
 
 def surfaces(**changes):
@@ -200,7 +200,9 @@ def test_a_flank_looks_as_the_mean_of_a_finer_picture(turn_deg):
     wide = Camera(
         np.array([[1400.0, 0, 79.5], [0, 1400.0, 59.5], [0, 0, 1]]), np.zeros(5), 160, 120
     )
-    part = Part("plate", disc(np.zeros(3), 150.0), MaterialId.BONE)
+    # One triangle: on a border between two, nine places would do.
+    corners = np.array([[-100.0, -100, 0], [-100, 300, 0], [300, -100, 0]])
+    part = Part("plate", TriangleMesh(corners, np.array([[0, 1, 2]], np.int32)), MaterialId.BONE)
     axis = np.array([0.8, 0.6, 0.0])
     poses = {
         "plate": RigidTransform.from_parts(
@@ -223,11 +225,12 @@ def test_a_flank_looks_as_the_mean_of_a_finer_picture(turn_deg):
     assert error.std() < 0.2 * mean[inside].std()
 
 
-def test_an_edge_looks_as_the_mean_of_a_finer_picture(femur, pinhole):
-    """As far as it lies before what does not move, and before nothing."""
+@pytest.mark.parametrize("centre_mm", [(0.0, 0.0, 480.0), (25.0, 10.0, 370.0)])
+def test_an_edge_looks_as_the_mean_of_a_finer_picture(femur, pinhole, centre_mm):
+    """Of a bone before or behind what does not move, and before nothing."""
     n, half = 5, pinhole.scale(0.5)
-    wall = disc(np.array([0.0, 0.0, 480.0]), 100.0)
-    parts = [Part("femur", femur, MaterialId.BONE), Part("drape", wall, MaterialId.DRAPE)]
+    wall = disc(np.array(centre_mm), 100.0 if centre_mm[2] > 400.0 else 20.0)
+    parts = [Part("femur", femur, MaterialId.BONE), Part("drape", wall, MaterialId.BONE)]
     poses = {"femur": POSE, "drape": RigidTransform.identity("camera", "drape")}
     matrix = np.diag([n, n, 1.0]) @ half.matrix
     matrix[:2, 2] += (n - 1) / 2
@@ -241,8 +244,8 @@ def test_an_edge_looks_as_the_mean_of_a_finer_picture(femur, pinhole):
     body = Renderer(half, parts, matt).depth(poses, NO_LAMPS).body
     rims = [~without_rim(body == k) & ~without_rim(body != k) for k in (0, 1)]
     for rim in rims:
-        assert rim.sum() > 150
-        assert np.abs(picture - mean)[rim].mean() < 0.04 * mean[rim].std()
+        assert rim.sum() > 100
+        assert np.abs(picture - mean)[rim].mean() < 0.023 * mean[rim].std()
 
 
 def test_a_crevice_is_as_dark_to_one_eye_as_to_the_other(femur):
@@ -287,9 +290,9 @@ def test_what_is_kept_gives_the_same_picture(femur, pinhole):
     aside = poses | {"femur": POSE.move((60.0, 20.0, 0, 0, 0, 0), POSE.translation_mm)}
     kept.render(aside, NO_LAMPS)
     bone = fresh.depth(poses, NO_LAMPS).body == 0
-    inside, outside = without_rim(bone), without_rim(~bone)
+    outside = without_rim(~bone)
     picture, at_once = kept.render(poses, NO_LAMPS), fresh.render(poses, NO_LAMPS)
-    np.testing.assert_array_equal(picture[inside], at_once[inside])
+    np.testing.assert_array_equal(picture[bone], at_once[bone])
     np.testing.assert_array_equal(
         kept.depth(poses, NO_LAMPS).depth_mm, fresh.depth(poses, NO_LAMPS).depth_mm
     )

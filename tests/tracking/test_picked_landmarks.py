@@ -60,7 +60,7 @@ def turn_deg(a: RigidTransform, b: RigidTransform) -> float:
 
 def test_picks_are_measured_where_the_bone_is() -> None:
     a = room()
-    frame, picks = a.frames[0], picked(5)
+    frame, picks = a.frames[0], picked(15)
     found = measure_picks_mm(frame, picks, a.tracker.meter)
     true = a.truth(frame).apply(np.array([pick.model_mm for pick in picks]))
     # At the rim of the bone what lies behind it is matched as well.
