@@ -5,14 +5,23 @@ another way. Only pixels with an edge are looked at in nine places, a third of a
 """
 
 import math
+from typing import Any
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from sim_devices.raster_kernels import BARELY, read_front_face
+
 # A depth step of more pixel widths than this, per pixel between, counts as an edge: 76 degrees.
 _STEEPEST = 4.0
-_BARELY = 1e-12
+_THIRD = 1.0 / 3.0
+
+
+@njit(cache=True, nogil=True, inline="always")
+def find_place(m: int) -> Any:
+    """How far place m (0 to 8) lies right of its pixel's middle, and below it, px."""
+    return (m % 3 - 1) * _THIRD, (m // 3 - 1) * _THIRD
 
 
 @njit(cache=True, nogil=True)
@@ -89,24 +98,15 @@ def raster_places(
         first_id: likewise.
         box: (4,) likewise.
         edge_number: (H, W) int32 of `number_edges`.
-        inverse_depth: (K, 9) float32 in and out; place m lies (m % 3 - 1) / 3 px right of the
-            pixel's middle and (m // 3 - 1) / 3 px below.
+        inverse_depth: (K, 9) float32 in and out, of the places of `find_place`.
         triangle: (K, 9) int32 in and out.
     """
-    third = 1.0 / 3.0
     for f in range(faces.shape[0]):
-        a, b, c = faces[f, 0], faces[f, 2], faces[f, 1]
-        wa, wb, wc = screen[a, 2], screen[b, 2], screen[c, 2]
-        if wa <= 0.0 or wb <= 0.0 or wc <= 0.0:
+        (ua, va, wa), (ub, vb, wb), (uc, vc, wc), area = read_front_face(screen, faces, f)
+        if area <= BARELY:
             continue
-        ua, va = screen[a, 0], screen[a, 1]
-        ub, vb = screen[b, 0], screen[b, 1]
-        uc, vc = screen[c, 0], screen[c, 1]
-        area = (ub - ua) * (vc - va) - (vb - va) * (uc - ua)
-        if area <= _BARELY:
-            continue
-        u_low, u_high = min(ua, ub, uc) - third, max(ua, ub, uc) + third
-        v_low, v_high = min(va, vb, vc) - third, max(va, vb, vc) + third
+        u_low, u_high = min(ua, ub, uc) - _THIRD, max(ua, ub, uc) + _THIRD
+        v_low, v_high = min(va, vb, vc) - _THIRD, max(va, vb, vc) + _THIRD
         if u_high < box[0] or u_low > box[2] - 1 or v_high < box[1] or v_low > box[3] - 1:
             continue
         x0, y0 = max(box[0], int(np.ceil(u_low))), max(box[1], int(np.ceil(v_low)))
@@ -118,10 +118,11 @@ def raster_places(
                 if edge < 0:
                     continue
                 for m in range(9):
-                    u, v = x + (m % 3 - 1) * third, y + (m // 3 - 1) * third
+                    du, dv = find_place(m)
+                    u, v = x + du, y + dv
                     ba = ((uc - ub) * (v - vb) - (vc - vb) * (u - ub)) * scale
                     bb = ((ua - uc) * (v - vc) - (va - vc) * (u - uc)) * scale
-                    if ba < -_BARELY or bb < -_BARELY or ba + bb > 1.0 + _BARELY:
+                    if ba < -BARELY or bb < -BARELY or ba + bb > 1.0 + BARELY:
                         continue
                     w = wc + ba * (wa - wc) + bb * (wb - wc)
                     if w > inverse_depth[edge, m]:

@@ -3,9 +3,14 @@
 Written apart from the pipeline's own z-buffer, so that an error in one does not hide in the other.
 """
 
+from typing import Any
+
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+
+# Areas (px^2) and weights of corners this near to 0 count as 0.
+BARELY = 1e-12
 
 
 @njit(cache=True, nogil=True)
@@ -55,6 +60,27 @@ def project_vertices(
         bounds[2], bounds[3] = max(bounds[2], u), max(bounds[3], v)
 
 
+@njit(cache=True, nogil=True, inline="always")
+def read_front_face(screen: NDArray[np.float64], faces: NDArray[np.int32], f: int) -> Any:
+    """Corners (u, v, 1 / z) of a face clockwise in the picture, and twice its area there, px^2.
+
+    The area is at most 0 of a face that is seen from behind, and of one that cannot be drawn.
+
+    Args:
+        screen: (V, 3) of `raster_triangles`.
+        faces: (F, 3) likewise.
+        f: index of the face.
+    """
+    a, b, c = faces[f, 0], faces[f, 2], faces[f, 1]
+    ua, va, wa = screen[a, 0], screen[a, 1], screen[a, 2]
+    ub, vb, wb = screen[b, 0], screen[b, 1], screen[b, 2]
+    uc, vc, wc = screen[c, 0], screen[c, 1], screen[c, 2]
+    area = 0.0
+    if wa > 0.0 and wb > 0.0 and wc > 0.0:
+        area = (ub - ua) * (vc - va) - (vb - va) * (uc - ua)
+    return (ua, va, wa), (ub, vb, wb), (uc, vc, wc), area
+
+
 @njit(cache=True, nogil=True)
 def raster_triangles(
     screen: NDArray[np.float64],
@@ -78,15 +104,8 @@ def raster_triangles(
         triangle: (H, W) int32 in and out: the face seen by each pixel.
     """
     for f in range(faces.shape[0]):
-        a, b, c = faces[f, 0], faces[f, 2], faces[f, 1]
-        wa, wb, wc = screen[a, 2], screen[b, 2], screen[c, 2]
-        if wa <= 0.0 or wb <= 0.0 or wc <= 0.0:
-            continue
-        ua, va = screen[a, 0], screen[a, 1]
-        ub, vb = screen[b, 0], screen[b, 1]
-        uc, vc = screen[c, 0], screen[c, 1]
-        area = (ub - ua) * (vc - va) - (vb - va) * (uc - ua)
-        if area <= 1e-12:
+        (ua, va, wa), (ub, vb, wb), (uc, vc, wc), area = read_front_face(screen, faces, f)
+        if area <= BARELY:
             continue
         # Compared as floats first: a triangle far outside must not overflow an integer.
         u_low, u_high = min(ua, ub, uc), max(ua, ub, uc)
@@ -108,9 +127,9 @@ def raster_triangles(
             w = wc + ba * (wa - wc) + bb * (wb - wc)
             for x in range(x0, x1 + 1):
                 if (
-                    ba >= -1e-12
-                    and bb >= -1e-12
-                    and ba + bb <= 1.0 + 1e-12
+                    ba >= -BARELY
+                    and bb >= -BARELY
+                    and ba + bb <= 1.0 + BARELY
                     and w > inverse_depth[y, x]
                 ):
                     inverse_depth[y, x] = w

@@ -157,16 +157,10 @@ class Renderer:
         With `rows` only these are right: the others lack what moves.
         """
         with self._lock:
-            image_kept, inverse_depth_kept, triangle_kept = self._render_background(
-                poses, camera_from_lamps
-            )
+            box = self._draw(poses, camera_from_lamps)
+            image_kept, _, triangle_kept = self._render_background(poses, camera_from_lamps)
             image = image_kept.copy()
-            box = self._project(poses, static=False)
             if box is not None:
-                # All of it, not only the box: no picture may depend on the one before.
-                self._inverse_depth[:] = inverse_depth_kept
-                self._triangle[:] = triangle_kept
-                self._raster(box, static=False)
                 if rows is not None:
                     # A row more on either side: an edge may lie between two rows.
                     box[1], box[3] = max(box[1], rows[0] - 1), min(box[3], rows[1] + 1)
@@ -182,12 +176,7 @@ class Renderer:
     ) -> DepthPicture:
         """What each pixel shows, from the same z-buffer as `render`."""
         with self._lock:
-            _, inverse_depth_kept, triangle_kept = self._render_background(poses, camera_from_lamps)
-            self._inverse_depth[:] = inverse_depth_kept
-            self._triangle[:] = triangle_kept
-            box = self._project(poses, static=False)
-            if box is not None:
-                self._raster(box, static=False)
+            self._draw(poses, camera_from_lamps)
             seen = self._triangle >= 0
             geometry = self._geometry
             index = [geometry.bodies.index(part.body) for part in geometry.parts]
@@ -197,6 +186,19 @@ class Renderer:
             depth_mm = np.zeros(seen.shape, dtype=np.float32)
             depth_mm[seen] = 1.0 / self._inverse_depth[seen]
             return DepthPicture(depth_mm, body, geometry.bodies)
+
+    def _draw(
+        self, poses: Mapping[str, RigidTransform], camera_from_lamps: RigidTransform
+    ) -> NDArray[np.int64] | None:
+        """Fill the z-buffer and its triangles; the box of pixels that moving parts can touch."""
+        # All of it, not only the box: no picture may depend on the one before.
+        _, self._inverse_depth[:], self._triangle[:] = self._render_background(
+            poses, camera_from_lamps
+        )
+        box = self._project(poses, static=False)
+        if box is not None:
+            self._raster(box, static=False)
+        return box
 
     def _render_background(
         self, poses: Mapping[str, RigidTransform], camera_from_lamps: RigidTransform
