@@ -22,7 +22,7 @@ _SINGULAR_FRACTION = 1e-9
 _TURN_FRACTION = 0.1
 # By how much the surface of a bone differs from its model beyond what the plan tells, along its
 # normal (standard deviation), and over which distance that goes together (tests.bench.bounds).
-RELIEF_SD_MM, RELIEF_LENGTH_MM = 0.033, 4.0
+RELIEF_SD_MM, RELIEF_LENGTH_MM = 0.0, 4.0
 # Standard deviation of a model's size before anything is seen of it.
 _SIZE_SD = 0.05
 
