@@ -216,7 +216,7 @@ class _Fit:
         information = compute_information(
             pairs._replace(direction=self._model.smooth_normals.take(pairs.vertex[:n], axis=0)),
             n, pose, self._model.centre_mm, self._scene.n_sharing_errors,
-            self._scene.n_sharing_relief,
+            tells_size=self._scene.tells_size,
         )  # fmt: skip
         reasons = [] if is_converged else [Reason.NOT_CONVERGED]
         reasons += [Reason.DEGENERATE] * information.is_degenerate
@@ -231,7 +231,6 @@ class _Fit:
             iterations=iterations,
             is_converged=is_converged,
             reasons=tuple(reasons),
-            relief_covariance=information.relief_covariance,
             sized=information.sized,
         )
         fits = np.flatnonzero(near.distance_mm < near.sigma_mm)

@@ -1,7 +1,7 @@
 """What residuals fix and what they leave free: covariance, degeneracy, the size of the bone."""
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +20,6 @@ from navapp.values import SizedPose
 _SINGULAR_FRACTION = 1e-9
 # A free direction turns when this much of it, in levers, is rotation; else it is a translation.
 _TURN_FRACTION = 0.1
-# By how much the surface of a bone differs from its model beyond what the plan tells, along its
-# normal (standard deviation), and over which distance that goes together (tests.bench.bounds).
-RELIEF_SD_MM, RELIEF_LENGTH_MM = 0.0, 4.0
 # Standard deviation of a model's size before anything is seen of it.
 _SIZE_SD = 0.05
 
@@ -37,9 +34,7 @@ class Information:
     # (K, 6) directions that are not fixed, as twists about the seen surface's centre in levers:
     # unit vectors, translation first, in the scene's frame.
     free: FloatArray
-    # (6, 6) as `covariance`: what the bone's relief adds to it.
-    relief_covariance: FloatArray = field(default_factory=lambda: np.zeros((6, 6)))
-    sized: SizedPose | None = None  # of pairs that know the relief and fix a pose
+    sized: SizedPose | None = None  # where it is asked for, of pairs that fix a pose
 
     @property
     def is_degenerate(self) -> bool:
@@ -64,16 +59,15 @@ def compute_information(
     pose: RigidTransform,
     centre_mm: FloatArray,
     n_sharing_errors: float,
-    n_sharing_relief: float = 0.0,
+    *,
+    tells_size: bool = False,
 ) -> Information:
     """Information of the first n pairs, weighted by kernel over variance, about `scene_from_bone`.
 
     Pairs and the model's centre (3,) are in bone coordinates. So many neighbouring pairs as
-    `n_sharing_errors` have their errors in common, and so many as `n_sharing_relief` the relief by
-    which the bone differs from its model; where that is told, the size is as well.
+    `n_sharing_errors` have their errors in common.
 
-    Source: Gauss-Newton normal equations at the solution; their inverse is the covariance. That of
-    the relief is the one of an estimator whose weights do not know it.
+    Source: Gauss-Newton normal equations at the solution; their inverse is the covariance.
     """
     seen_mm, lever_mm = find_weighted_centre(pairs, n)
     H, _ = sum_plane_system(pairs, n, seen_mm, lever_mm)
@@ -89,12 +83,8 @@ def compute_information(
     change = _pose_by_points(pose.rotation, lever_mm, arm_mm)
     of_pose, inverse = change[:6, :6], np.linalg.inv(H)
     covariance = n_sharing_errors * _propagate(of_pose, inverse)
-    if n_sharing_relief <= 0.0:
+    if not tells_size:
         return Information(covariance, free)
-    relief = n_sharing_relief * RELIEF_SD_MM**2
-    squared_pairs = pairs._replace(weight=pairs.weight**2)
-    squared, _ = _sum_sized_system(squared_pairs, n, seen_mm, lever_mm)
-    relief_covariance = relief * _propagate(of_pose @ inverse, squared[:6, :6])
     # The size as a seventh unknown; where the pairs do not fix it, as expected.
     H, g = _sum_sized_system(pairs, n, seen_mm, lever_mm)
     H[6, 6] += n_sharing_errors / (_SIZE_SD * lever_mm) ** 2
@@ -104,9 +94,8 @@ def compute_information(
         n_sharing_errors * _propagate(change, inverse),
         arm_mm,
         lever_mm,
-        relief * _propagate(change @ inverse, squared),
     )
-    return Information(covariance, free, relief_covariance, sized)
+    return Information(covariance, free, sized)
 
 
 def _propagate(change: FloatArray, covariance: FloatArray) -> FloatArray:

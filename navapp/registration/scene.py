@@ -1,6 +1,5 @@
 """What was measured, ready to be registered to."""
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -34,24 +33,16 @@ class Scene:
     sigma_ray_mm: FloatArray | None = None
     # so many neighbouring points have their errors in common and count as one.
     n_sharing_errors: float = 1.0
-    # so many have the relief in common by which a bone differs from its model; 0: not counted.
-    n_sharing_relief: float = 0.0
+    tells_size: bool = False  # whether the size of the bone is asked for beside its pose
     thinned_to: int = 500  # the coarse loop uses about so many points
 
     @classmethod
     def from_stereo(
-        cls, cloud: SurfaceCloud, correlation_px: float, relief_px: float = 0.0
+        cls, cloud: SurfaceCloud, correlation_px: float, *, tells_size: bool = False
     ) -> "Scene":
-        """A cloud in the rectified left camera, whose errors go together over a distance.
-
-        The correlation of a bone's relief falls to 1 / e over `relief_px`; 0: it is not counted.
-        """
+        """A cloud in the rectified left camera, whose errors go together over a distance."""
         n_sharing_errors = max(1.0, (correlation_px / cloud.stride_px) ** 2)
-        # The integral of exp(-r / length) over the picture.
-        n_sharing_relief = 2.0 * math.pi * (relief_px / cloud.stride_px) ** 2
-        return cls(
-            cloud.points_mm, np.zeros(3), cloud.sigma_ray_mm, n_sharing_errors, n_sharing_relief
-        )
+        return cls(cloud.points_mm, np.zeros(3), cloud.sigma_ray_mm, n_sharing_errors, tells_size)
 
     def __post_init__(self) -> None:
         points = np.asarray(self.points_mm)

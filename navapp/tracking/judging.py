@@ -134,15 +134,9 @@ class PoseJudge:
         model, measured, agreement = self._meter.model, fit.measured, check.agreement
         view = measured.rendered
         if agreement is not None:
-            # For a bone in the open, noise is taken as large as correct poses show at most, and
-            # relief is added. For a hidden one noise is taken as claimed, which is
-            # more than both: something flush with the bone may fit as well.
-            lies_open = agreement.lies_open
-            noise_variance_ratio = NOISE_VARIANCE_RATIO if lies_open else 1.0
-            if lies_open:
-                # Divided, because what follows multiplies: relief is known as it is, noise as it
-                # is claimed.
-                fit = replace(fit, estimate=fit.estimate.with_relief(1.0 / noise_variance_ratio))
+            # For a bone in the open, noise is taken as large as correct poses show. For a hidden
+            # one it is taken as claimed: something flush with the bone may fit as well.
+            noise_variance_ratio = NOISE_VARIANCE_RATIO if agreement.lies_open else 1.0
             if "contour" in self._settings.leaves_out:
                 joined = replace(fit, estimate=fit.estimate.scale_noise(noise_variance_ratio))
             else:

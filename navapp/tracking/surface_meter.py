@@ -20,7 +20,6 @@ from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.zbuffer import RenderedView, bounds_of
 from navapp.registration import RegistrationModel, Scene
-from navapp.registration.information import RELIEF_LENGTH_MM
 from navapp.stereo import (
     MODEL_REFINEMENT,
     CoarseMap,
@@ -82,9 +81,6 @@ class Measurement:
     correlation_px: float  # distance in the picture over which its errors go together
     # the model that it was measured on; None of a free measurement.
     rendered: RenderedView | None = None
-    # length over which the bone's relief goes together, mm, times the focal length, px: over the
-    # depth in mm it is `relief_px`; 0: relief is not counted.
-    relief_mm_px: float = 0.0
 
     @cached_property
     def cloud(self) -> SurfaceCloud:
@@ -92,16 +88,10 @@ class Measurement:
         return self.make_cloud()
 
     @property
-    def relief_px(self) -> float:
-        """As of `Scene.from_stereo`."""
-        # What was measured on the model has no outlier that lies far off: the mean will do.
-        z_mm = self.cloud.points_mm[:, 2]
-        return self.relief_mm_px / float(z_mm.mean()) if len(z_mm) > 0 else 0.0
-
-    @property
     def scene(self) -> Scene:
         """The cloud, to be registered to."""
-        return Scene.from_stereo(self.cloud, self.correlation_px, self.relief_px)
+        tells_size = self.rendered is not None
+        return Scene.from_stereo(self.cloud, self.correlation_px, tells_size=tells_size)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -135,7 +125,6 @@ class SurfaceMeter:
         self.leaves_out_outlines = model.bone.lid is not None and model.bone.face is None
         self.rectifier = rectifier_of(rig)
         self.geometry = self.rectifier.geometry
-        self._relief_mm_px = RELIEF_LENGTH_MM * self.geometry.focal_px
         self._reduced = {n: ReducedRectifier(self.rectifier, n) for n in NearerSearch.REDUCTIONS}
         # Several steps ask for the same few poses. No method: it would keep the meter alive.
         bounds = partial(bounds_of, model.hull_mm, geometry=self.geometry)
@@ -266,7 +255,7 @@ class SurfaceMeter:
         n_expected = max(int(np.count_nonzero(is_expected)), 1)
         return Measurement(
             found, lambda: self._cloud(remove_gap_rims(found, is_expected)),
-            found.n_matched / n_expected, correlation_px, expected.view, self._relief_mm_px,
+            found.n_matched / n_expected, correlation_px, expected.view,
         )  # fmt: skip
 
     def measure_on_samples(self, expected: Expected) -> Measurement:
@@ -281,10 +270,7 @@ class SurfaceMeter:
         matched_fraction = int(np.count_nonzero(thin.origin)) / n_asked
         found = _spread(thin, _SAMPLES_PX, support_px.shape)
         make_cloud = partial(found.reproject, self.geometry, _SAMPLES_PX)
-        return Measurement(
-            found, make_cloud, matched_fraction, MODEL_CORRELATION_PX, expected.view,
-            self._relief_mm_px,
-        )  # fmt: skip
+        return Measurement(found, make_cloud, matched_fraction, MODEL_CORRELATION_PX, expected.view)
 
     def _cloud(self, found: DisparityMap) -> SurfaceCloud:
         """About `_N_POINTS` of the measured ones."""

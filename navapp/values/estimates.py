@@ -1,6 +1,6 @@
 """An estimated pose of a bone, how well it is fixed, and what that means for points of the bone."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,8 +21,6 @@ class SizedPose:
     covariance: FloatArray  # (7, 7) of it
     arm_mm: FloatArray  # (3,) from the middle of what is seen to the model's centre
     lever_mm: float  # rms distance of what is seen from its middle
-    # (7, 7) as `covariance`: what the bone's relief adds to it.
-    relief_covariance: FloatArray = field(default_factory=lambda: np.zeros((7, 7)))
 
     @property
     def growth_mm(self) -> float:
@@ -60,11 +58,6 @@ class SizedPose:
         """The same with a covariance so many times as large."""
         return replace(self, covariance=variance_ratio * self.covariance)
 
-    def with_relief(self, times: float) -> "SizedPose":
-        """The same with so many times the bone's relief in the covariance."""
-        covariance = self.covariance + times * self.relief_covariance
-        return replace(self, covariance=covariance, relief_covariance=np.zeros((7, 7)))
-
     def turn(self, rotation: FloatArray) -> "SizedPose":
         """The same in a frame that is turned by `rotation` (3, 3)."""
         change = np.eye(7)
@@ -74,7 +67,6 @@ class SizedPose:
             step=change @ self.step,
             covariance=change @ self.covariance @ change.T,
             arm_mm=rotation @ self.arm_mm,
-            relief_covariance=change @ self.relief_covariance @ change.T,
         )
 
     def seen_from(self, twist: FloatArray) -> "SizedPose":
@@ -99,8 +91,6 @@ class PoseEstimate:
     iterations: int  # of the solver
     is_converged: bool  # the last step was small enough
     reasons: tuple[Reason, ...] = ()  # what the solver itself has against the result
-    # (6, 6) as `covariance`: what the bone's relief adds to it, which no model knows.
-    relief_covariance: FloatArray = field(default_factory=lambda: np.zeros((6, 6)))
     # The pose in the size that is seen; what it shifts points by is in all predicted errors. None
     # where the size is taken as it is: of what was not measured on the model.
     sized: SizedPose | None = None
@@ -119,15 +109,6 @@ class PoseEstimate:
         sized = None if self.sized is None else self.sized.scale_noise(variance_ratio)
         return replace(self, covariance=variance_ratio * self.covariance, sized=sized)
 
-    def with_relief(self, times: float) -> "PoseEstimate":
-        """The same with so many times the bone's relief in the covariances of pose and size."""
-        return replace(
-            self,
-            covariance=self.covariance + times * self.relief_covariance,
-            relief_covariance=np.zeros((6, 6)),
-            sized=None if self.sized is None else self.sized.with_relief(times),
-        )
-
     def turn_camera(self, turned: RigidTransform) -> "PoseEstimate":
         """The same in a camera that is turned about its centre.
 
@@ -141,7 +122,6 @@ class PoseEstimate:
         return replace(
             moved,
             covariance=turn @ self.covariance @ turn.T,
-            relief_covariance=turn @ self.relief_covariance @ turn.T,
             sized=None if self.sized is None else self.sized.turn(turned.rotation),
         )
 

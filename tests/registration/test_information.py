@@ -6,7 +6,6 @@ import pytest
 from navapp.geometry.mesh import TriangleMesh
 from navapp.registration import BimccSettings, RegistrationModel, Scene, fit_bimcc
 from navapp.registration.information import (
-    RELIEF_SD_MM,
     compute_information,
     leaves_direction_free,
 )
@@ -56,23 +55,6 @@ def test_points_that_share_their_errors_count_as_one() -> None:
     np.testing.assert_allclose(
         compute_information(pairs, n, POSE, CENTRE, 9.0).covariance, 9.0 * alone
     )
-
-
-@pytest.mark.kernel
-def test_relief_that_neighbours_share_is_told_beside_noise() -> None:
-    pairs, n, measured, _ = measured_pairs(make_case())
-    weigh(pairs, n, 1.0, 2.5, 0.0)
-    weight = pairs.weight[:n].copy()
-    inverse = np.linalg.inv(reference.twist_information(measured, weight, POSE, CENTRE))
-    squares = reference.twist_information(measured, weight**2, POSE, CENTRE)
-    expected = 40.0 * RELIEF_SD_MM**2 * inverse @ squares @ inverse
-    found = compute_information(pairs, n, POSE, CENTRE, 9.0, 40.0)
-    np.testing.assert_allclose(
-        found.relief_covariance, expected, rtol=1e-4, atol=1e-6 * np.abs(expected).max()
-    )
-    without = compute_information(pairs, n, POSE, CENTRE, 9.0)
-    np.testing.assert_array_equal(found.covariance, without.covariance)
-    assert not without.relief_covariance.any()
 
 
 def test_a_ball_leaves_three_rotations_free() -> None:
@@ -149,8 +131,8 @@ def test_a_single_point_fixes_one_direction_of_six() -> None:
 
 
 def on_model(points_mm: np.ndarray, sigma_ray_mm: np.ndarray) -> Scene:
-    """Points that know the relief, as those that were measured on a model."""
-    return Scene(points_mm, np.zeros(3), sigma_ray_mm, n_sharing_relief=1.0)
+    """Points that tell the size, as those that were measured on a model."""
+    return Scene(points_mm, np.zeros(3), sigma_ray_mm, tells_size=True)
 
 
 @pytest.mark.parametrize("size", [0.97, 1.0, 1.03])

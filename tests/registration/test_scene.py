@@ -34,16 +34,6 @@ def test_points_within_the_correlation_share_their_errors(
     assert Scene.from_stereo(cloud, correlation_px).n_sharing_errors == pytest.approx(sharing)
 
 
-def test_points_share_a_relief_within_its_length() -> None:
-    cloud = seen_cloud(femur(), 100, 0.2)
-    cloud = type(cloud)(cloud.points_mm, cloud.sigma_ray_mm, cloud.pixels, cloud.origin, 3)
-    # The integral of exp(-r / 9 px) over points that are 3 px apart.
-    r_px = np.hypot(*np.meshgrid(*[np.arange(-200, 200) * 3.0] * 2))
-    expected = np.exp(-r_px / 9.0).sum()
-    assert Scene.from_stereo(cloud, 11.0, 9.0).n_sharing_relief == pytest.approx(expected, rel=0.02)
-    assert Scene.from_stereo(cloud, 11.0).n_sharing_relief == 0.0
-
-
 def test_without_a_camera_and_a_sigma_the_kernels_are_told_so() -> None:
     scene = Scene(POINTS)
     assert not scene.knows_noise

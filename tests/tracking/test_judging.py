@@ -245,7 +245,7 @@ def test_the_right_bone_has_the_right_size_and_a_larger_one_has_not() -> None:
     for size, reasons in ((1.0, False), (0.95, True)):
         scaled = mesh.centroid_mm + size * (mesh.vertices_mm - mesh.centroid_mm)
         model = RegistrationModel(replace(BONE, mesh=replace(mesh, vertices_mm=scaled)))
-        scene = replace(scene_of(MAP), n_sharing_relief=9.0)
+        scene = replace(scene_of(MAP), tells_size=True)
         verdict = judged(fit_bimcc(scene, model, TRUE, FREE_SETTINGS), model=model).verdict
         assert (Reason.SIZE_DIFFERS in verdict.reasons) == reasons
 

@@ -1,7 +1,6 @@
 """The measured surface on the model: which of it the fit may trust."""
 
 import numpy as np
-import pytest
 
 from navapp.geometry.masks import grow
 from navapp.registration import RegistrationModel
@@ -10,7 +9,6 @@ from navapp.tracking.surface_meter import NEAR_BOX, NEAR_VIEW, SurfaceMeter, rem
 from navapp.values import DisparityMap, DrillAxis, MeasuredFace
 from tests.reference.both_eyes_reference import unclear
 from tests.resection import cuts
-from tests.tracking.rooms import room
 
 SHAPE = (80, 120)
 HOLE = DrillAxis("femur", np.array([0.0, 0.0, 12.0]), np.array([0.0, 0.0, -1.0]), 5.0, 6.0)
@@ -57,20 +55,6 @@ def test_where_too_little_would_be_left_all_of_it_is_trusted() -> None:
     stripes[:, 3:] = np.arange(3, SHAPE[1]) % 8 > 0
     found = found_beside(stripes)
     np.testing.assert_array_equal(remove_gap_rims(found, EVERYWHERE).origin, found.origin)
-
-
-def test_relief_goes_together_over_four_millimetres() -> None:
-    a = room()
-    picture, meter = a.frames[0], a.tracker.meter
-    pose = a.tracker.rectify_pose(a.truth(picture))
-    expected = meter.render(
-        meter.rectify(picture.left, picture.right, pose, NEAR_VIEW), pose, NEAR_BOX
-    )
-    assert expected is not None
-    measured = meter.measure_on_model(expected)
-    depth_mm = np.median(measured.cloud.points_mm[:, 2])
-    expected_px = 4.0 * meter.geometry.focal_px / depth_mm
-    assert measured.relief_px == pytest.approx(expected_px, rel=0.01)
 
 
 def test_what_an_outline_is_mixed_with_does_not_pull_what_is_measured() -> None:
