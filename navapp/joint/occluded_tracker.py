@@ -15,7 +15,7 @@ from navapp.registration import RegistrationModel
 from navapp.registration.verdict import Agreement
 from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.tracking.checks import PairCheck
-from navapp.tracking.frame import NOISE_VARIANCE_RATIO, Fit, Frame
+from navapp.tracking.frame import Fit, Frame
 from navapp.tracking.judging import PoseJudge
 from navapp.values import DisparityMap
 
@@ -106,15 +106,16 @@ class _HiddenBoneJudge(PoseJudge):
     ) -> tuple[Fit, RenderedView | None, Agreement | None]:
         """As of any judge, then grown."""
         fit, view, agreement = super()._settle(frame, fit, check, counts_unmeasured)
-        estimate = fit.estimate
-        if view is not None and agreement is not None and agreement.lies_open:
-            whole = self._whole.render(fit.pose, self._geometry, view.box)
-            share = agreement.n_visible / max(int(np.count_nonzero(whole.mask)), 1)
-            if agreement.coverage * share <= 1.0 - share * (1.0 - agreement.hidden_fraction):
-                # The noise of a bone in the open was counted: it is as claimed.
-                estimate = estimate.scale_noise(1.0 / NOISE_VARIANCE_RATIO)
-        estimate = replace(estimate, covariance=estimate.covariance + self._spread)
-        return replace(fit, estimate=estimate), view, agreement
+        covariance = fit.estimate.covariance + self._spread
+        return replace(fit, estimate=replace(fit.estimate, covariance=covariance)), view, agreement
+
+    def _noise_variance_ratio(self, fit: Fit, agreement: Agreement) -> float:
+        """As of any judge, but what the occluder hides of the whole bone counts as hidden."""
+        whole = self._whole.render(fit.pose, self._geometry, fit.measured.disparity.box)
+        share = agreement.n_visible / max(int(np.count_nonzero(whole.mask)), 1)
+        if agreement.coverage * share <= 1.0 - share * (1.0 - agreement.hidden_fraction):
+            return 1.0
+        return super()._noise_variance_ratio(fit, agreement)
 
 
 class OccludedTracker(BimccTracker):

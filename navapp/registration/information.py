@@ -34,7 +34,7 @@ class Information:
     # (K, 6) directions that are not fixed, as twists about the seen surface's centre in levers:
     # unit vectors, translation first, in the scene's frame.
     free: FloatArray
-    sized: SizedPose | None = None  # where it is asked for, of pairs that fix a pose
+    sized: SizedPose | None = None  # where it was asked for, of pairs that fix a pose
 
     @property
     def is_degenerate(self) -> bool:
@@ -65,7 +65,8 @@ def compute_information(
     """Information of the first n pairs, weighted by kernel over variance, about `scene_from_bone`.
 
     Pairs and the model's centre (3,) are in bone coordinates. So many neighbouring pairs as
-    `n_sharing_errors` have their errors in common.
+    `n_sharing_errors` have their errors in common. With `tells_size` pose and size fitted together
+    are told as well.
 
     Source: Gauss-Newton normal equations at the solution; their inverse is the covariance.
     """

@@ -180,7 +180,7 @@ RULES = (
          lambda e: e.says(Reason.AMBIGUOUS), 0, None, CHOSEN, doubts_place=True),
     Rule(Reason.CUES_DISAGREE, "half of the outline is off by 3 sigma (yes 1)",
          lambda e: e.says(Reason.CUES_DISAGREE), 0, None, "tests.bench.outline"),
-    Rule(Reason.SURFACE_MISFIT, "correlated residuals' variance over the noise of right poses",
+    Rule(Reason.SURFACE_MISFIT, "variance of correlated residuals over the largest noise",
          lambda e: e.correlated_ratio, 2.0, None, _RESIDUALS, doubts_place=True),
     Rule(Reason.COVERAGE_LOW, "what nothing hides: measured and agreeing",
          lambda e: e.seen.open_coverage, 0.2, 0.15, _JUDGE_LIMITS, is_below=True,

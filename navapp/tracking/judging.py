@@ -134,9 +134,7 @@ class PoseJudge:
         model, measured, agreement = self._meter.model, fit.measured, check.agreement
         view = measured.rendered
         if agreement is not None:
-            # For a bone in the open, noise is taken as large as correct poses show. For a hidden
-            # one it is taken as claimed: something flush with the bone may fit as well.
-            noise_variance_ratio = NOISE_VARIANCE_RATIO if agreement.lies_open else 1.0
+            noise_variance_ratio = self._noise_variance_ratio(fit, agreement)
             if "contour" in self._settings.leaves_out:
                 joined = replace(fit, estimate=fit.estimate.scale_noise(noise_variance_ratio))
             else:
@@ -154,6 +152,14 @@ class PoseJudge:
                 view, model, disparity, geometry, check.coarse_px, check.is_near_clipped
             )
         return fit, view, agreement
+
+    def _noise_variance_ratio(self, fit: Fit, agreement: Agreement) -> float:
+        """Variance that counts as noise over the one that a fit on the model claims.
+
+        For a bone in the open it is what correct poses show in the median. For a hidden one it is
+        what is claimed: something flush with the bone may fit as well.
+        """
+        return NOISE_VARIANCE_RATIO if agreement.lies_open else 1.0
 
     def lost(self, reason: Reason, watch: Stopwatch) -> TrackedFrame:
         """The answer when there is no fit to judge."""

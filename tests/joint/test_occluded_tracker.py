@@ -10,8 +10,9 @@ from navapp.geometry.transform import RigidTransform
 from navapp.geometry.zbuffer import render_rectified
 from navapp.joint.occluded_tracker import OccludedTracker, Occluder
 from navapp.tracking import TrackerSettings, TrackState
+from navapp.tracking.agreement import Agreement
 from navapp.tracking.bimcc_tracker import BimccTracker
-from navapp.tracking.frame import NOISE_VARIANCE_RATIO
+from navapp.tracking.frame import Fit
 from navapp.tracking.judging import PoseJudge
 from navapp.values import DisparityMap, Status
 from tests.geometry.shapes import sphere
@@ -106,6 +107,13 @@ def test_a_spread_makes_the_bound_larger_and_moves_nothing() -> None:
     assert poses[1].verdict.predicted_tre_mm > poses[0].verdict.predicted_tre_mm
 
 
+class ClaimsStand(PoseJudge):
+    """Takes noise as it is claimed, of every bone."""
+
+    def _noise_variance_ratio(self, fit: Fit, agreement: Agreement) -> float:
+        return 1.0
+
+
 def test_a_bone_that_is_hidden_for_the_most_part_does_not_lie_in_the_open() -> None:
     """Though most of what is left of it is seen: its noise counts as it is claimed."""
     a = room()
@@ -119,11 +127,12 @@ def test_a_bone_that_is_hidden_for_the_most_part_does_not_lie_in_the_open() -> N
         hidden = OccludedTracker(a.tracker, ball, before)
         begun = hidden.begin(frame, start)
         fit = next(hidden.near.find_on_model(begun))
-        plain = PoseJudge(hidden.meter, TrackerSettings())
+        judges = [kind(hidden.meter, TrackerSettings()) for kind in (PoseJudge, ClaimsStand)]
         bounds[radius_mm] = [
             np.trace(judge.judge(begun, fit, GOAL).estimate.covariance)
-            for judge in (plain, hidden.judge)
+            for judge in (*judges, hidden.judge)
         ]
     small, large = bounds.values()
-    assert small[0] == pytest.approx(small[1])
-    assert large[1] == pytest.approx(large[0] / NOISE_VARIANCE_RATIO)
+    assert small[2] == pytest.approx(small[0])
+    assert large[2] == pytest.approx(large[1])
+    assert large[2] > 1.5 * large[0]

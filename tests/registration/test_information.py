@@ -175,7 +175,7 @@ def test_one_side_of_a_plane_has_no_size() -> None:
     points = np.random.default_rng(1).uniform(-20.0, 20.0, (400, 3)) * (1.0, 1.0, 0.0)
     bent = np.tile([0.0, 0.0, 1.0], (400, 1))
     bent[:, :2] = np.random.default_rng(2).normal(0.0, 1e-3, (400, 2))
-    found = compute_information(*pairs_on(points, bent), POSE, CENTRE, 1.0, 1.0)
+    found = compute_information(*pairs_on(points, bent), POSE, CENTRE, 1.0, tells_size=True)
     # As before anything was seen: some per cent at the lever.
     assert found.sized.growth_mm == pytest.approx(0.0, abs=1e-6)
     assert found.sized.growth_sigma_mm == pytest.approx(0.05 * found.sized.lever_mm, rel=0.05)
@@ -185,4 +185,4 @@ def test_a_free_measurement_tells_no_size() -> None:
     mesh = blob_mesh()
     pairs = pairs_on(mesh.vertices_mm, mesh.normals)
     assert compute_information(*pairs, POSE, CENTRE, 1.0).sized is None
-    assert compute_information(*pairs, POSE, CENTRE, 1.0, 2.0).sized is not None
+    assert compute_information(*pairs, POSE, CENTRE, 1.0, tells_size=True).sized is not None

@@ -141,10 +141,16 @@ def test_what_residuals_have_in_common_counts_of_a_fit_on_the_model_alone() -> N
     """Errors of a free measurement go together anyway."""
     a = room()
     frame, fit = found_at_the_truth(a)
-    rough = replace(fit.estimate, rms_mm=0.95 * fit.estimate.expected_rms_mm)
-    on_model = replace(fit, estimate=rough)
-    free = replace(on_model, measured=replace(fit.measured, rendered=None))
-    for one, is_misfit in ((fit, False), (on_model, True), (free, False)):
+    expected_mm = fit.estimate.expected_rms_mm
+    noisy, rough = (
+        replace(fit, estimate=replace(fit.estimate, rms_mm=times * expected_mm))
+        for times in (0.67, 0.95)
+    )
+    free = replace(rough, measured=replace(fit.measured, rendered=None))
+    # All residuals of the noisy one show 0.8 of what they claim: more than correct poses of a
+    # femur, but not twice the variance of the noisiest.
+    assert noisy.variance_ratio**0.5 == pytest.approx(0.8, abs=0.03)
+    for one, is_misfit in ((fit, False), (noisy, False), (rough, True), (free, False)):
         verdict = judge_with(SurfaceAlone()).judge(frame, one, GOAL).verdict
         assert (Reason.SURFACE_MISFIT in verdict.reasons) == is_misfit
         assert verdict.status is not Status.LOST

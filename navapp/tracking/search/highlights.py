@@ -28,9 +28,9 @@ from navapp.tracking.surface_meter import (
 )
 from navapp.values import DisparityMap
 
-# How far both are off, over what they claim and over the 0.65 of grey pictures of a right pose:
-# pictures without highlights have less texture, and where they answer nothing, grey ones see the
-# highlights (tests.bench.bone_highlights).
+# How far both are off, over what they claim and over the 0.65 beyond which residuals are no noise
+# (`LARGEST_NOISE_VARIANCE_RATIO`): pictures without highlights have less texture, and where they
+# answer nothing, grey ones see the highlights (tests.bench.bone_highlights).
 _MATTE_ALONE, _GREY_ALONE = np.float32(1.5), np.float32(2.0)
 # Spread of the differences between both answers, over what both claim, and pixels that are answered
 # without highlights, over those in grey. On six matt patellas 0.62 to 0.68 and 0.97 to 1.01, on
