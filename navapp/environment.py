@@ -53,10 +53,19 @@ def kernel_hash() -> str:
     numba's cache notices an edit in the file of a kernel, but not in a kernel called from another
     file; a folder named after all of them together does.
     """
+    return _hash_files("*kernels.py", sys.version)
+
+
+def source_hash() -> str:
+    """Hash of every module: results with the same one are of the same code."""
+    return _hash_files("*.py", "")
+
+
+def _hash_files(pattern: str, start: str) -> str:
     root = Path(__file__).resolve().parent.parent
-    digest = hashlib.sha256(sys.version.encode())
+    digest = hashlib.sha256(start.encode())
     for package in _PACKAGES:
-        for path in sorted((root / package).rglob("*kernels.py")):
+        for path in sorted((root / package).rglob(pattern)):
             digest.update(path.name.encode())
             digest.update(path.read_bytes())
     return digest.hexdigest()[:12]

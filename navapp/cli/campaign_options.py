@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from navapp.cli.campaign_progress import CampaignProgress
 from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
 from navapp.errors import UsageError
 
@@ -104,13 +105,11 @@ def run_and_write(
     check_writable(options.json)
     n_processes = options.processes or min(4, os.cpu_count() or 1)
     folder: CampaignFolder[Any] = CampaignFolder(options.out, settings)
-    diagnostics.note(f"{len(settings.tests)} tests, {n_processes} at a time, into {options.out}")
-
-    def tell(n_done: int, n_all: int, name: str) -> None:
-        diagnostics.progress("evaluating", n_done / n_all)
-        diagnostics.detail(f"{n_done} of {n_all}: {name}")
-
-    run_campaign(folder, settings, n_processes, tell)
+    n_tests, n_timed = len(settings.tests), len(settings.timed_tests)
+    alone = f", then {n_timed} alone for their times" if n_timed else ""
+    diagnostics.note(f"{n_tests} tests, {n_processes} at a time{alone}, into {options.out}")
+    progress = CampaignProgress(n_tests, n_processes, diagnostics)
+    run_campaign(folder, settings, n_processes, progress.tell)
     content = write(folder)
     write_json(str(folder.path / file_name), "evaluate", content)
     write_json(options.json, "evaluate", content)

@@ -52,12 +52,12 @@ class Diagnostics:
             sys.stderr.write(f"\r\x1b[K{text}" + ("\n" if is_last else ""))
             sys.stderr.flush()
 
-    def progress(self, what: str, share: float) -> None:
+    def progress(self, what: str, share: float, after: str = "") -> None:
         """A bar on stderr, when that is a terminal and details do not run through it."""
         if not self.has_live_line:
             return
         n = round(30 * min(max(share, 0.0), 1.0))
-        bar = f"{what} [{'#' * n}{'.' * (30 - n)}] {100 * share:3.0f} %"
+        bar = f"{what} [{'#' * n}{'.' * (30 - n)}] {100 * share:3.0f} %{after}"
         self.tell_live(bar, is_last=share >= 1.0)
 
 

@@ -2,6 +2,7 @@
 
 import argparse
 from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +14,10 @@ if TYPE_CHECKING:
     from navapp.cli.session_folder import RecordedSession
     from navapp.config import Configuration
     from navapp.evaluation.recording.study import Studied
+    from navapp.evaluation.recording.truth_files import Truth
+    from navapp.geometry.rig import StereoRig
     from navapp.tracking import Method
+    from navapp.values import Plan, Prior, StageSpec
 
 _TRUTH, _PRIOR, _RIG = "truth.json", "prior.json", "rig.yml"
 # Options that mean nothing without a recording.
@@ -81,10 +85,12 @@ def run_recording(
         raise UsageError(f"a rate of {options.fps:g} Hz is none", remedy="give a positive --fps")
     folder = check_folder(options.out)
     configuration = load(find_file(options.config))
-    studied = [
-        _study(sequence, options, configuration, methods, diagnostics)
-        for sequence in _list_sequences(options)
+    # All files are read before the first recording is followed: that takes long.
+    given = [
+        _read(sequence, options, configuration, diagnostics)
+        for sequence in _list_sequences(options, diagnostics)
     ]
+    studied, failures = _study_all(given, methods, diagnostics)
     content = write_report(folder, studied)
     write_json(str(folder / "evaluate.json"), "evaluate", content)
     write_json(options.json, "evaluate", content)
@@ -92,11 +98,41 @@ def run_recording(
         _say(content["rows"], options.out, diagnostics)
     if not any(row["ok_share"] > 0.0 for row in content["rows"]):
         raise ResultError("no frame was OK", remedy=f"see the reasons in {folder / 'frames.csv'}")
+    if failures:
+        raise ResultError(
+            f"{len(failures)} of {len(given)} recordings could not be evaluated",
+            remedy="see the warnings; the results are of the others",
+        )
     return 0
 
 
-def _list_sequences(options: argparse.Namespace) -> list[_Sequence]:
+def _study_all(
+    given: "Sequence[_Given]", methods: "Sequence[Method]", diagnostics: Diagnostics
+) -> "tuple[list[Studied], list[ResultError]]":
+    """Every recording that can be evaluated, and why others cannot.
+
+    Raises:
+        ResultError: the only one cannot be, or none can.
+    """
+    studied: list[Studied] = []
+    failures: list[ResultError] = []
+    for one in given:
+        try:
+            studied.append(_study(one, methods, diagnostics))
+        except ResultError as error:
+            if len(given) == 1:
+                raise
+            diagnostics.warn(f"{one.sequence.name} is left out: {error}")
+            failures.append(error)
+    if not studied:
+        raise failures[0]
+    return studied, failures
+
+
+def _list_sequences(options: argparse.Namespace, diagnostics: Diagnostics) -> list[_Sequence]:
     """The recording itself, or those in the folder."""
+    from navapp.cli.session_folder import is_session
+
     path = Path(options.recording)
     if not path.exists() and "," not in options.recording:
         raise SequenceError(
@@ -105,8 +141,8 @@ def _list_sequences(options: argparse.Namespace) -> list[_Sequence]:
             remedy="give a session folder, a folder of pairs, or two videos LEFT,RIGHT",
         )
     inner = sorted(found.parent for found in path.glob(f"*/{_TRUTH}")) if path.is_dir() else []
-    with_both = [one for one in inner if (one / _PRIOR).is_file()]
-    if with_both:
+    ready = [one for one in inner if (one / _PRIOR).is_file() or is_session(one)]
+    if ready:
         for name in ("truth", "prior"):
             if getattr(options, name) is not None:
                 raise UsageError(
@@ -114,9 +150,13 @@ def _list_sequences(options: argparse.Namespace) -> list[_Sequence]:
                     subject=str(path),
                     remedy=f"leave --{name} out, or name one of them with --recording",
                 )
+        for one in (one for one in inner if one not in ready):
+            diagnostics.warn(f"{one} is left out: nothing says where the bone is ({_PRIOR})")
         return [
-            _Sequence(f"{path.name}/{one.name}", str(one), str(one / _TRUTH), str(one / _PRIOR))
-            for one in with_both
+            _Sequence(
+                f"{path.name}/{one.name}", str(one), str(one / _TRUTH), _find_beside(one, _PRIOR)
+            )
+            for one in ready
         ]
     truth_path = options.truth or _find_beside(path, _TRUTH)
     if truth_path is None:
@@ -133,20 +173,34 @@ def _find_beside(path: Path, name: str) -> str | None:
     return str(path / name) if (path / name).is_file() else None
 
 
-def _study(
+@dataclass(frozen=True, slots=True, eq=False)
+class _Given:
+    """What a recording is evaluated with."""
+
+    sequence: _Sequence
+    configuration: "Configuration"
+    truth: "Truth"
+    rig: "StereoRig"
+    plan: "Plan"
+    prior: "Prior"
+    stage: "StageSpec"
+    rate_hz: float  # where there are no times
+
+
+def _read(
     sequence: _Sequence,
     options: argparse.Namespace,
     configuration: "Configuration",
-    methods: "Sequence[Method]",
     diagnostics: Diagnostics,
-) -> "Studied":
+) -> _Given:
+    """All but the pictures, checked against each other and against the pictures' numbers."""
+    from drivers.replay_camera import open_source
     from navapp.cli.headless import check_accepted, check_start
     from navapp.cli.other_bones import find_stage_of
     from navapp.cli.recorded_operation import find_drawn_start
     from navapp.cli.session_folder import is_session, read_session
     from navapp.control.prior_files import read_prior
     from navapp.control.stages import stage_by_name
-    from navapp.evaluation.recording.study import Study, open_frames, study
     from navapp.evaluation.recording.truth_files import check_truth, read_truth
     from navapp.geometry.rig_files import read_rig
     from navapp.preop import read_plan
@@ -164,13 +218,24 @@ def _study(
     if session is not None and options.prior is None:
         prior = find_drawn_start(session, prior, stage.bone)
     check_start(prior, stage.bone)
+    with closing(open_source(sequence.source, False)) as source:
+        check_truth(truth, sequence.truth_path, source.numbers, stage.bone)
     rate_hz = configuration.camera.rate_hz if options.fps is None else options.fps
-    told = _Progress(sequence.name, len(methods), diagnostics)
-    with open_frames(sequence.source, rig, rate_hz, told) as frames:
-        check_truth(truth, sequence.truth_path, frames.numbers, stage.bone)
-        diagnostics.note(f"{sequence.name}: {len(frames)} pairs, {', '.join(methods)}")
-        given = Study(sequence.name, frames, truth, configuration, rig, plan, prior, stage)
-        return study(given, methods)
+    return _Given(sequence, configuration, truth, rig, plan, prior, stage, rate_hz)
+
+
+def _study(given: _Given, methods: "Sequence[Method]", diagnostics: Diagnostics) -> "Studied":
+    from navapp.evaluation.recording.study import Study, open_frames, study
+
+    name = given.sequence.name
+    told = _Progress(name, len(methods), diagnostics)
+    with open_frames(given.sequence.source, given.rig, given.rate_hz, told) as frames:
+        diagnostics.note(f"{name}: {len(frames)} pairs, {', '.join(methods)}")
+        one = Study(
+            name, frames, given.truth, given.configuration, given.rig, given.plan, given.prior,
+            given.stage,
+        )  # fmt: skip
+        return study(one, methods)
 
 
 def _find_rig_and_plan(

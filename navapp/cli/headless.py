@@ -106,14 +106,14 @@ class FrameLog:
     Args:
         n_expected: so many frames, None when that is not known.
         diagnostics: takes the progress and, when verbose, a line a frame.
-        describe: makes that line.
+        describe: makes that line; None: the usual one. Where it is given, every frame has its line.
     """
 
     def __init__(
         self,
         n_expected: int | None,
         diagnostics: Diagnostics,
-        describe: Callable[[FrameResult], str] = frame_text,
+        describe: Callable[[FrameResult], str] | None = None,
     ) -> None:
         self.results: list[FrameResult] = []
         self._n_expected = n_expected
@@ -126,7 +126,10 @@ class FrameLog:
         frame = replace(result.frame, left=_NO_PICTURE, right=_NO_PICTURE)
         picture = replace(result.picture, image=_NO_PICTURE)
         self.results.append(replace(result, frame=frame, picture=picture))
-        self._diagnostics.detail(self._describe(result))
+        if self._describe is not None:
+            self._diagnostics.note(self._describe(result))
+            return
+        self._diagnostics.detail(frame_text(result))
         self._diagnostics.tell_live(self._line(result), is_last=self.is_full)
 
     def _line(self, result: FrameResult) -> str:

@@ -75,7 +75,10 @@ def add_parser(subparsers: Any) -> None:
         help="pingpong: to and fro; each: every frame is registered on its own from the prior",
     )
     parser.add_argument(
-        "--truth", metavar="T", help="poses of the bones: the error of every frame is told"
+        "--truth",
+        metavar="T",
+        help="poses of the bones: every frame has a line with its error (other kinds of truth: "
+        "`navapp evaluate --recording`)",
     )
     parser.add_argument("--frames", type=int, metavar="N", help="end after N frames")
     parser.add_argument("--start", type=int, default=0, metavar="I", help="first picture's number")
@@ -115,7 +118,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     """Do it."""
     from navapp.cli.headless import FrameLog, check_accepted, check_start, report_result
     from navapp.cli.replay_truth import read_replay_truth
-    from navapp.cli.results import frame_text, frame_to_json, rig_alarm_to_json
+    from navapp.cli.results import frame_to_json, rig_alarm_to_json
     from navapp.config import find_file, load
     from navapp.control.beside_femur import may_start_from
     from navapp.devices import open_recording
@@ -137,7 +140,7 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
                 check_start(specification.prior, bone)
     truth = read_replay_truth(options, specification.plan, specification.stage.bone)
     opened = open_recording(options.sequence, settings, rig, configuration)
-    describe = frame_text if truth is None else truth.tell
+    describe = None if truth is None else truth.tell
     log = FrameLog(opened.devices.camera.info.n_frames, diagnostics, describe)
     seconds, failure = _run_session(replay, opened, log, options, settings.rate_hz, diagnostics)
     frames = [

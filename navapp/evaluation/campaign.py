@@ -1,12 +1,14 @@
 """Runs the tests of all cases, some at a time, and keeps each in a folder as it is done."""
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar
 
+from navapp import __version__
+from navapp.environment import source_hash
 from navapp.errors import InputError, UsageError
 from navapp.evaluation.following import Answers
 from navapp.evaluation.scores import Followed
@@ -16,6 +18,8 @@ from navapp.evaluation.worst_frame import draw_worst_frame
 from navapp.geometry.whole_files import write_whole
 
 _SETTINGS, _TESTS, _TIMES, _PICTURES = "settings.json", "tests", "times", "pictures"
+# Settings that tell the code: results of two kinds of code do not belong into one table.
+_CODE = frozenset({"navapp", "source"})
 
 
 class KnownTest(Protocol):
@@ -100,14 +104,10 @@ class CampaignFolder(Generic[T]):
 
     def __init__(self, folder: str | Path, settings: Campaign[T]) -> None:
         self.path, self._settings = Path(folder), settings
-        wanted, kept = settings.to_json(), self.path / _SETTINGS
+        wanted = {"navapp": __version__, "source": source_hash(), **settings.to_json()}
+        kept = self.path / _SETTINGS
         if kept.is_file():
-            if _read_settings(kept) != wanted:
-                raise UsageError(
-                    f"{folder} holds another evaluation",
-                    subject=str(folder),
-                    remedy="give the same options to go on with it, or choose another --out",
-                )
+            _check_same(folder, _read_settings(kept), wanted)
             return
         is_folder = self.path.is_dir()
         if self.path.exists() and (not is_folder or any(self.path.iterdir())):
@@ -179,13 +179,15 @@ def run_campaign(
         folder: takes the results.
         settings: what is run.
         n_processes: at a time; times are taken in a pass of their own, one at a time.
-        on_progress: told after each group how many of how many are done, and which was the last.
+        on_progress: told how many of how many are done, and which was the last: before anything is
+            run (none), and after each group.
     """
     timed = settings.timed_tests
     missing = folder.missing(settings.tests, is_timed=False)
     slow = folder.missing(timed, is_timed=True)
     total = len(settings.tests) + len(timed)
     n_done = total - len(missing) - len(slow)
+    on_progress(n_done, total, "")
     for part, processes, is_timed in ((missing, n_processes, False), (slow, 1, True)):
         run = partial(run_tests, folder, settings, is_timed=is_timed)
         for tests in run_in_processes(run, settings.group(part), processes):
@@ -228,6 +230,25 @@ def _warm_up(settings: Campaign[Any]) -> None:
     sequence = settings.render(settings.tests[0], 2)
     for method in settings.methods:
         settings.follow(sequence, method)
+
+
+def _check_same(folder: str | Path, kept: Any, wanted: Mapping[str, Any]) -> None:
+    """Refuse to go on with another evaluation, or with other code."""
+    if kept == wanted:
+        return
+    if isinstance(kept, dict) and all(
+        kept.get(key) == wanted[key] for key in wanted.keys() - _CODE
+    ):
+        raise UsageError(
+            f"{folder} was begun with other code of navapp",
+            subject=str(folder),
+            remedy="go on with that code, or choose another --out",
+        )
+    raise UsageError(
+        f"{folder} holds another evaluation",
+        subject=str(folder),
+        remedy="give the same options to go on with it, or choose another --out",
+    )
 
 
 def _read_settings(path: Path) -> Any:

@@ -4,11 +4,15 @@ import csv
 import json
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from navapp.cli import evaluate_recording
+from navapp.cli.diagnostics import Diagnostics
 from navapp.cli.main import run
+from navapp.errors import ResultError
 from navapp.geometry.ply import read_ply
 from navapp.preop import build_aspects, write_plan
 from navapp.values import BoneModel, Plan
@@ -114,7 +118,7 @@ def test_a_replay_tells_the_error_of_every_frame(plan, recordings, tmp_path, cap
         "replay", sequence, "--rig", recordings / "rig.yml", "--plan", plan,
         "--prior", sequence / "prior.json", "--truth", sequence / "truth.json", "--json", poses,
     ]  # fmt: skip
-    assert run(["--verbose", *(str(word) for word in command)]) == 0
+    assert run([str(word) for word in command]) == 0
     content = json.loads(poses.read_text("utf-8"))
     errors = [frame["tre_mm"] for frame in content["frames"]]
     assert len(errors) == 4
@@ -181,3 +185,57 @@ def test_a_replay_refuses_a_truth_that_does_not_fit(
     ]  # fmt: skip
     assert run(["--quiet", *(str(word) for word in command)]) == code
     assert told in capsys.readouterr().err
+
+
+def several(tmp_path, *names: str) -> Path:
+    """A folder of recordings of which only the truth is there."""
+    for name in names:
+        (tmp_path / "several" / name).mkdir(parents=True)
+        (tmp_path / "several" / name / "truth.json").write_text("{}")
+    return tmp_path / "several"
+
+
+def test_recordings_without_a_start_are_named(tmp_path, capsys) -> None:
+    folder = several(tmp_path, "a", "b", "c")
+    (folder / "b" / "prior.json").write_text("{}")
+    (folder / "c" / "session.json").write_text("{}")
+    options = SimpleNamespace(recording=str(folder), truth=None, prior=None)
+    found = evaluate_recording._list_sequences(options, Diagnostics())
+    assert [(one.name, one.prior_path) for one in found] == [
+        ("several/b", str(folder / "b" / "prior.json")),
+        ("several/c", None),  # a session brings its own
+    ]
+    told = capsys.readouterr().err
+    assert f"{folder / 'a'} is left out: nothing says where the bone is (prior.json)" in told
+    assert told.count("left out") == 1
+
+
+def test_one_recording_that_fails_does_not_lose_the_others(monkeypatch, capsys) -> None:
+    def study(given, methods, diagnostics):
+        if given.sequence.name == "bad":
+            raise ResultError("cannot be solved", remedy="move more")
+        return given.sequence.name
+
+    monkeypatch.setattr(evaluate_recording, "_study", study)
+    good, bad = (SimpleNamespace(sequence=SimpleNamespace(name=name)) for name in ("good", "bad"))
+    studied, failures = evaluate_recording._study_all([bad, good], ("bimcc",), Diagnostics())
+    assert (studied, len(failures)) == (["good"], 1)
+    assert "bad is left out: cannot be solved: move more" in capsys.readouterr().err
+    for none in ([bad], [bad, bad]):
+        with pytest.raises(ResultError, match="cannot be solved"):
+            evaluate_recording._study_all(none, ("bimcc",), Diagnostics())
+
+
+def test_every_truth_is_read_before_anything_is_followed(
+    plan, recordings, tmp_path, monkeypatch, capsys
+) -> None:
+    folder = tmp_path / "copied"
+    shutil.copytree(recordings, folder)
+    (folder / "patient" / "truth.json").write_text("{")
+
+    def refuse(*_: object) -> None:
+        raise AssertionError("a recording is followed")
+
+    monkeypatch.setattr(evaluate_recording, "_study", refuse)
+    assert evaluate("--recording", folder, "--plan", plan, "--out", tmp_path / "out") == 3
+    assert "patient/truth.json cannot be understood" in capsys.readouterr().err

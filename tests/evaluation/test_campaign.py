@@ -101,9 +101,10 @@ def test_a_group_is_run_as_a_whole_and_gone_on_within(line: Line, tmp_path) -> N
     line.is_killed_at = None
     run(tmp_path, grouped, told)
     assert len(list((tmp_path / "tests").iterdir())) == 4
-    # Both groups at their ends: two tests that were left, and those for times.
+    # What was done before, and both groups at their ends: two that were left, those for times.
     n_timed = len(grouped.timed_tests)
-    assert [(n, of) for n, of, _ in told] == [(4, 4 + n_timed), (4 + n_timed, 4 + n_timed)]
+    assert [n for n, _, _ in told] == [2, 4, 4 + n_timed]
+    assert {of for _, of, _ in told} == {4 + n_timed}
     n_followed = sum(method == "bimcc" for _, method in line.done)
     assert n_followed == 4 + 1 + n_timed, "each test once, one to warm up, those for times"
 
@@ -134,7 +135,7 @@ def test_every_test_has_a_file_and_the_first_of_each_case_its_times(line, tmp_pa
             "times/man-opening-overlay-0.json",
         ]
     )
-    assert [news[:2] for news in told] == [(n, 6) for n in range(1, 7)]
+    assert [news[:2] for news in told] == [(n, 6) for n in range(7)]
     assert [one.test.name for one in folder.read(is_timed=False)] == NAMES
     assert list(next(folder.read(is_timed=True)).followed) == ["paper", "bimcc"]
 
@@ -170,7 +171,7 @@ def test_killed_in_the_middle_it_goes_on_where_it_was(line, tmp_path, n_followed
     line.done.clear()
     campaign._warm_up.cache_clear()
     run(tmp_path / "killed", told=told)
-    assert len(told) == 6 - len(done)
+    assert [n for n, _, _ in told] == list(range(len(done), 7))
     after = files_of(tmp_path / "killed")
     assert {name: after[name] for name in done} == {name: before[name] for name in done}
     whole = files_of(tmp_path / "whole")
@@ -204,10 +205,11 @@ def test_other_settings_are_refused_and_change_nothing(line, tmp_path, other) ->
     assert files_of(tmp_path) == before
 
 
-def test_another_version_is_another_evaluation(line, tmp_path, monkeypatch) -> None:
+@pytest.mark.parametrize("of_code", ["__version__", "source_hash"])
+def test_other_code_does_not_go_on(line, tmp_path, monkeypatch, of_code: str) -> None:
     run(tmp_path)
-    monkeypatch.setattr(settings_of_tables, "__version__", "99")
-    with pytest.raises(UsageError, match="another evaluation"):
+    monkeypatch.setattr(campaign, of_code, "99" if of_code == "__version__" else lambda: "99")
+    with pytest.raises(UsageError, match="begun with other code of navapp: go on with that code"):
         CampaignFolder(tmp_path, SETTINGS)
 
 

@@ -2,13 +2,10 @@
 
 import csv
 import io
-import os
-import platform
 from collections.abc import Sequence
 from typing import Any
 
 from calibration.report.page import make_html
-from navapp import __version__
 from navapp.evaluation.ablation.chart import draw_variants
 from navapp.evaluation.ablation.rows import ALL, make_variant_rows
 from navapp.evaluation.ablation.settings import AblationSettings
@@ -16,6 +13,7 @@ from navapp.evaluation.ablation.tables import make_ablation_tables
 from navapp.evaluation.campaign import CampaignFolder, Done
 from navapp.evaluation.paper.cases import CaseTest
 from navapp.evaluation.paper.report import render_markdown
+from navapp.evaluation.provenance import describe_origin
 from navapp.geometry.whole_files import write_whole
 
 _COLUMNS = (
@@ -53,8 +51,7 @@ def _about(settings: AblationSettings, done: Sequence[Done[CaseTest]]) -> list[s
     n_most = max(settings.count_frames(test) for test in settings.tests)
     of_instrument = f" ({n_most} with an instrument)" if n_most > knees.n_frames else ""
     return [
-        f"navapp {__version__}, Python {platform.python_version()}, {platform.machine()}, "
-        f"{os.cpu_count()} cores",
+        describe_origin(),
         f"{len(done)} of {len(settings.tests)} tests, each another knee, of sample {samples}; "
         f"{knees.n_frames} frames each after the registration{of_instrument}; first seed "
         f"{knees.first_seed}",

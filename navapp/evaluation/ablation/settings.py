@@ -62,6 +62,6 @@ class AblationSettings:
         return follow(sequence, "bimcc", VARIANTS[method])
 
     def to_json(self) -> dict[str, Any]:
-        """Named values, with the version that has them."""
+        """Named values."""
         variants = {name: sorted(parts) for name, parts in VARIANTS.items()}
         return {**self.knees.to_json(), "methods": list(VARIANTS), "ablation": variants}

@@ -2,13 +2,10 @@
 
 import csv
 import io
-import os
-import platform
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from navapp import __version__
 from navapp.evaluation.campaign import CampaignFolder, Done
 from navapp.evaluation.judge.findings import JudgeFindings, examine_judge
 from navapp.evaluation.paper.cases import INSTRUMENT_S, SWEEP_FRAMES, Case, CaseTest
@@ -21,6 +18,7 @@ from navapp.evaluation.paper.tables import make_tables
 from navapp.evaluation.peers.rows import make_peer_rows
 from navapp.evaluation.peers.scores import read_peers
 from navapp.evaluation.peers.tables import format_peers, make_peer_csv
+from navapp.evaluation.provenance import describe_origin
 from navapp.evaluation.scores import LEVELS, FrameScore
 from navapp.geometry.whole_files import write_whole
 
@@ -66,6 +64,7 @@ def write_results(folder: CampaignFolder[CaseTest], settings: TableSettings) -> 
     if peers:
         write_whole(folder.path / "peers.csv", make_peer_csv(peers).encode())
     return {
+        "origin": describe_origin(),
         "rows": [row.to_json() for row in rows],
         "peers": [row.to_json() for row in peer_rows],
         "summary": _summarise(rows, judged, settings, done) | findings.to_json(),
@@ -88,8 +87,7 @@ def _examine(done: Sequence[Done[CaseTest]]) -> JudgeFindings:
 
 def _about(settings: TableSettings, done: Sequence[Done[CaseTest]]) -> list[str]:
     return [
-        f"navapp {__version__}, Python {platform.python_version()}, {platform.machine()}, "
-        f"{os.cpu_count()} cores",
+        describe_origin(),
         f"{len(done)} of {len(settings.tests)} tests, each another knee, {settings.n_frames} "
         f"frames each after the registration; first seed {settings.first_seed}",
         _tell_sweep(settings),

@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, cast
 
-from navapp import __version__
 from navapp.evaluation.following import Answers, follow
 from navapp.evaluation.paper.cases import (
     ALL_CASES,
@@ -32,9 +31,8 @@ class TableSettings:
     is_quick: bool = False
 
     def to_json(self) -> dict[str, Any]:
-        """Named values, with the version that has them."""
+        """Named values."""
         return {
-            "navapp": __version__,
             "cases": [case.name for case in self.cases],
             **{key: value for key, value in asdict(self).items() if key != "cases"},
             "methods": list(self.methods),

@@ -58,16 +58,21 @@ def judge_method(method: Method, done: Sequence[Done[Any]]) -> Judged:
 
     Frames of one knee are much alike: the limit by knees is the one to be believed.
     """
-    n_frames = n_ok = n_wrong = n_within = n_knees = n_wrong_knees = 0
+    n_frames = n_ok = n_wrong = n_within = 0
+    knees: set[int] = set()  # seeds: a knee has its own, at all levels of a stress
+    wrong_knees: set[int] = set()
     for one in done:
         frames = one.followed[method].frames
         ok = [frame for frame in frames if frame.is_ok and frame.tre_mm is not None]
         wrong = sum(is_wrong(frame) for frame in ok)
         n_frames, n_ok, n_wrong = n_frames + len(frames), n_ok + len(ok), n_wrong + wrong
         n_within += sum(is_within_bound(frame) for frame in ok)
-        n_knees, n_wrong_knees = n_knees + bool(ok), n_wrong_knees + bool(wrong)
+        if ok:
+            knees.add(one.test.seed)
+        if wrong:
+            wrong_knees.add(one.test.seed)
     coverage = n_within / n_ok if n_ok else None
-    return Judged(method, n_frames, n_ok, n_knees, n_wrong, n_wrong_knees, coverage)
+    return Judged(method, n_frames, n_ok, len(knees), n_wrong, len(wrong_knees), coverage)
 
 
 def compare_with_paper(rows: Sequence[Row]) -> dict[str, Any]:

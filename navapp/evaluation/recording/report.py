@@ -4,17 +4,16 @@ import base64
 import csv
 import io
 import os
-import platform
 from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
 
 from calibration.report.page import make_html, make_note
-from navapp import __version__
 from navapp.errors import InputError, UsageError
 from navapp.evaluation.paper.report import render_markdown
 from navapp.evaluation.paper.tables import format_mm
+from navapp.evaluation.provenance import describe_origin
 from navapp.evaluation.recording.charts import draw_errors_beside_bounds, draw_errors_over_frames
 from navapp.evaluation.recording.rows import RecordingRow, make_rows
 from navapp.evaluation.recording.study import Studied
@@ -82,7 +81,7 @@ def write_report(folder: Path, studied: Sequence[Studied]) -> dict[str, Any]:
 def _make_tables(studied: Sequence[Studied], rows: Sequence[RecordingRow]) -> str:
     parts = ["# Evaluation on recordings", ""]
     parts += [
-        f"- navapp {__version__}, Python {platform.python_version()}, {platform.machine()}",
+        f"- {describe_origin()}",
         "- research software, not for clinical use",
         "",
         "## Errors",

@@ -6,7 +6,6 @@ from functools import lru_cache
 from itertools import count, groupby, islice
 from typing import Any
 
-from navapp import __version__
 from navapp.config import Configuration
 from navapp.config.camera_sections import CameraSection, SimulationSection
 from navapp.devices.simulated_room import find_cartilage_mm
@@ -89,10 +88,9 @@ class StressSettings:
     methods: tuple[Method, ...] = ("bimcc",)
 
     def to_json(self) -> dict[str, Any]:
-        """Named values, with the version that has them."""
+        """Named values."""
         levels = {name: list(AXES[name].levels) for name in self.axes}
         return {
-            "navapp": __version__,
             "stress": levels,
             **{key: value for key, value in asdict(self).items() if key != "axes"},
             "methods": list(self.methods),

@@ -2,18 +2,16 @@
 
 import csv
 import io
-import os
-import platform
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 from calibration.report.page import make_html
 from calibration.report.plots import BLUE, ORANGE, draw_svg
-from navapp import __version__
 from navapp.evaluation.campaign import CampaignFolder, Done
 from navapp.evaluation.paper.report import render_markdown
 from navapp.evaluation.paper.summary import Judged, judge_method
+from navapp.evaluation.provenance import describe_origin
 from navapp.evaluation.scores import Followed
 from navapp.evaluation.stress.axes import AXES
 from navapp.evaluation.stress.bars import check_blur
@@ -42,6 +40,7 @@ def write_stress(folder: CampaignFolder[StressTest], settings: StressSettings) -
     write_whole(folder.path / "report.html", report.encode())
     write_whole(folder.path / "frames.csv", _make_csv(done).encode())
     return {
+        "origin": describe_origin(),
         "axes": [one.to_json() for one in axes],
         "summary": {
             "tests": len(done),
@@ -70,8 +69,7 @@ def _only_counted(done: Done[StressTest]) -> Followed:
 
 def _about(settings: StressSettings, done: Sequence[Done[StressTest]]) -> list[str]:
     return [
-        f"navapp {__version__}, Python {platform.python_version()}, {platform.machine()}, "
-        f"{os.cpu_count()} cores",
+        describe_origin(),
         f"{len(done)} of {len(settings.tests)} sequences: {settings.n_knees} knees a level, the "
         f"same at all levels of an axis, {settings.n_frames} frames each that count; first seed "
         f"{settings.first_seed}",

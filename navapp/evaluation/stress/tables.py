@@ -85,9 +85,9 @@ def _format_wrong(axes: Sequence[AxisRows], judged: Judged) -> list[str]:
     by_frames, by_knees = judged.wrong_at_most
     lines = [
         f"Over all levels that pictures can show: {judged.n_wrong} of {judged.n_ok} OK frames, of "
-        f"{judged.n_frames}, are wrong; in {judged.n_wrong_knees} of {judged.n_knees} sequences. "
-        f"At most {100.0 * by_frames:.3f} % of OK frames and {100.0 * by_knees:.1f} % of sequences "
-        "(95 %, one-sided; frames and levels of one knee are alike)."
+        f"{judged.n_frames}, are wrong; in {judged.n_wrong_knees} of {judged.n_knees} knees. "
+        f"At most {100.0 * by_frames:.3f} % of OK frames and {100.0 * by_knees:.1f} % of knees "
+        "(95 %, one-sided; frames of one knee are alike)."
     ]
     for one in axes:
         levels = [row.level for row in one.rows if row.n_wrong and not row.is_hidden]

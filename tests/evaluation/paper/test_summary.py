@@ -8,6 +8,7 @@ from navapp.evaluation.paper.published import find_published
 from navapp.evaluation.paper.rows import make_row
 from navapp.evaluation.paper.summary import compare_with_paper, find_upper_limit, judge_method
 from tests.evaluation.scored import done, followed, score
+from tests.evaluation.stressed import stressed
 
 
 @pytest.mark.parametrize(("k", "n"), [(0, 1), (0, 300), (1, 300), (7, 12000), (11, 12)])
@@ -38,6 +39,13 @@ def test_frames_and_knees_are_counted() -> None:
     assert by_knees == pytest.approx(beta.ppf(0.95, 3, 1))
     told = judged.to_json()
     assert told["wrong_share_at_most"] == {"of_ok_frames": by_frames, "of_knees": by_knees}
+
+
+def test_a_knee_counts_once_at_however_many_levels() -> None:
+    wrong = (score(0.1), score(3.0))
+    tests = stressed("light", {1.0: (wrong, [score(0.1)]), 0.5: (wrong, [score(0.1)])})
+    judged = judge_method("bimcc", tests)
+    assert (judged.n_knees, judged.n_wrong_knees, judged.n_wrong) == (2, 1, 2)
 
 
 def test_nothing_ok_says_nothing() -> None:
