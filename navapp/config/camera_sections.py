@@ -86,7 +86,7 @@ class SimulationSection(Section):
     """Whether what moves while a picture is exposed (8 ms) is blurred."""
     shutter_ms: Annotated[float, Field(ge=0.0, le=50.0)] = 0.0
     """Rolling shutter: the last row is exposed later than the first by this; 0: all at once."""
-    shake_mm: Annotated[float, Field(ge=0.0, le=2.0)] = 0.0
+    shake_mm: Annotated[float, Field(ge=0.0, le=5.0)] = 0.0
     """Amplitude with which the arm that carries the cameras shakes; 0: it stands still."""
     shake_hz: Annotated[float, Field(gt=0.0, le=50.0)] = 8.0
     """Frequency of the shake."""

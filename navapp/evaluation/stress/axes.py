@@ -101,7 +101,7 @@ _PICTURE_AXES = (
     Axis("shutter", "rolling shutter, leg moved at 50 mm/s", "ms",
          (0.0, 5.0, 10.0, 15.0, 20.0, 25.0), 0.0,
          _Setting("shutter_ms", {"blur": True, **_DRIFTING}), rate_hz=_DRIFT_RATE_HZ),
-    Axis("shake", "shake of the arm at 8 Hz", "mm", (0.0, 0.1, 0.3, 0.5, 1.0, 2.0), 0.0,
+    Axis("shake", "shake of the arm at 8 Hz", "mm", (0.0, 0.3, 0.5, 1.0, 2.0, 5.0), 0.0,
          _Setting("shake_mm", {"blur": True})),
     Axis("highlights", "area of the wet highlights", "times",
          (0.0, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0), 1.0, _Setting("highlights")),
@@ -112,7 +112,7 @@ _PICTURE_AXES = (
          (0.0, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8), 0.0, _Setting("covered")),
     Axis("distance", "distance", "mm", (300.0, 350.0, 450.0, 550.0, 650.0, 800.0), 450.0,
          _Setting("distance_mm")),
-    Axis("baseline", "baseline, known", "mm", (30.0, 40.0, 60.0, 80.0, 120.0, 160.0), 80.0,
+    Axis("baseline", "baseline, known", "mm", (20.0, 30.0, 60.0, 80.0, 120.0, 160.0, 240.0), 80.0,
          _Setting("baseline_mm")),
     Axis("skew", "time between the eyes that the stamps tell, leg moved at 50 mm/s", "ms",
          (0.0, 1.0, 2.0, 5.0, 10.0), 0.0, _Setting("skew_ms", _DRIFTING), found_by=_STAMPS,
@@ -147,17 +147,17 @@ _PLAN_AXES = (
 )  # fmt: skip
 
 # Of each number of a camera: its unit, and levels that move points of the picture's outer parts by
-# some tenths of a pixel to some pixels.
+# some tenths of a pixel to several pixels, so that OK ends among them.
 _NUMBERS = {
     "fx": ("%", (0.0, 0.05, 0.1, 0.2, 0.5, 1.0)),
     "fy": ("%", (0.0, 0.05, 0.1, 0.2, 0.5, 1.0)),
     "cx": ("px", (0.0, 0.1, 0.25, 0.5, 1.0, 2.0)),
     "cy": ("px", (0.0, 0.1, 0.25, 0.5, 1.0, 2.0)),
-    "k1": ("", (0.0, 0.002, 0.005, 0.01, 0.02)),
-    "k2": ("", (0.0, 0.02, 0.05, 0.1, 0.2)),
-    "p1": ("", (0.0, 0.0002, 0.0005, 0.001, 0.002)),
-    "p2": ("", (0.0, 0.0002, 0.0005, 0.001, 0.002)),
-    "k3": ("", (0.0, 0.1, 0.3, 1.0, 3.0)),
+    "k1": ("", (0.0, 0.005, 0.02, 0.05, 0.2)),
+    "k2": ("", (0.0, 0.05, 0.2, 0.5, 2.0)),
+    "p1": ("", (0.0, 0.0005, 0.002, 0.005, 0.02)),
+    "p2": ("", (0.0, 0.0005, 0.002, 0.005, 0.02)),
+    "k3": ("", (0.0, 0.3, 3.0, 10.0, 30.0)),
 }
 
 
@@ -185,7 +185,7 @@ _RIG_AXES = (
          rig=changes.change_turn(2), found_by=_BOARD),
     Axis("place-y", "right camera higher or lower", "mm", (0.0, 0.02, 0.05, 0.1, 0.2), 0.0,
          rig=changes.change_place(1), found_by=_BOARD),
-    Axis("place-z", "right camera further back", "mm", (0.0, 0.1, 0.3, 1.0, 2.0), 0.0,
+    Axis("place-z", "right camera further back", "mm", (0.0, 0.3, 1.0, 2.0, 5.0), 0.0,
          rig=changes.change_place(2), found_by=_BOARD),
     *_camera_axes(),
 )  # fmt: skip
