@@ -156,7 +156,7 @@ class PoseJudge:
     def _noise_variance_ratio(self, fit: Fit, agreement: Agreement) -> float:
         """Variance that counts as noise over the one that a fit on the model claims.
 
-        For a bone in the open it is what correct poses show in the median. For a hidden one it is
+        For a bone in the open it is what correct poses show at most. For a hidden one it is
         what is claimed: something flush with the bone may fit as well.
         """
         return NOISE_VARIANCE_RATIO if agreement.lies_open else 1.0
