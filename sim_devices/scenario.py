@@ -14,7 +14,7 @@ InstrumentKind = Literal["none", "sweep"]
 
 _HIGHEST = {
     "cartilage_mm": 2.6, "contrast": 0.2, "blood": 1.0, "misses": 2.0,
-    "drift_mm_s": HIGHEST_MM_S, "shake_mm": 2.0, "shake_hz": 50.0, "highlights": 32.0,
+    "drift_mm_s": HIGHEST_MM_S, "shake_mm": 5.0, "shake_hz": 50.0, "highlights": 32.0,
     "distance_mm": 1000.0,
 }  # fmt: skip
 # 0 of all others.

@@ -5,10 +5,10 @@ import platform
 import re
 import subprocess
 from functools import cache
+from importlib.metadata import version
 from pathlib import Path
 
 import cv2
-import numba
 import numpy as np
 
 from navapp import __version__
@@ -22,7 +22,7 @@ def describe_origin() -> str:
     code = f"source {source_hash()}" if commit is None else f"commit {commit}"
     return (
         f"navapp {__version__}, {code}; Python {platform.python_version()}, "
-        f"numpy {np.__version__}, numba {numba.__version__}, OpenCV {cv2.__version__}; "
+        f"numpy {np.__version__}, numba {version('numba')}, OpenCV {cv2.__version__}; "
         f"{_name_processor()}, {os.cpu_count()} cores"
     )
 
