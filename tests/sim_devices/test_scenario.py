@@ -22,7 +22,7 @@ from sim_devices.scenario import Scenario
         {"contrast": 0.3},
         {"blood": 1.1},
         {"drift_mm_s": 300.5},
-        {"shake_mm": 2.1},
+        {"shake_mm": 5.1},
         {"shake_hz": -8.5},
         {"highlights": 33.5},
         {"distance_mm": 199.5},
