@@ -164,7 +164,7 @@ RULES = (
          lambda e: e.detail_ratio, 2.0, None, CHOSEN),
     Rule(Reason.ROWS_DISAGREE, "rows too far apart to be compared (yes 1)",
          lambda e: e.has_lost_rows, 0, None, _HEALTH),
-    Rule(Reason.ROWS_DISAGREE, "depth error that the rows' offset stands for, mm",
+    Rule(Reason.ROWS_DISAGREE, "depth error that the rows' offset or stretch stands for, mm",
          lambda e: e.row_error_mm, OK_ERROR_MM, None, CHOSEN),
     _without_pose(Reason.BONE_LOST, "nothing was found where the bone was expected (yes 1)"),
     _without_pose(Reason.NO_SURFACE, "no surface was measured (yes 1)"),

@@ -11,6 +11,7 @@ import numpy as np
 
 from navapp.geometry.box import Box
 from navapp.geometry.rectification import Image, RectifiedPair
+from navapp.geometry.transform import FloatArray
 from navapp.stereo.health_kernels import measure_rows
 from navapp.values import DisparityMap
 
@@ -28,6 +29,10 @@ _LEAST_CORRELATION = 0.7
 # Texture of a twentieth is below one grey level here; and what a sensor clips to.
 _DARK_LEVEL, _SATURATED_LEVEL = 16, 250
 _ROWS_APART, _COLUMNS_APART = 2, 4
+_STRETCH_ROUNDS = 3
+# Row offsets of many points that go together: highlights lie elsewhere in both pictures.
+_ALIKE_PX = 0.05
+_NO_ROWS = (math.nan,) * 4  # offset and stretch, and their standard errors
 _MEDIAN_TO_MEAN, _MAD_TO_SIGMA = 1.2533, 1.4826
 
 
@@ -50,6 +55,9 @@ class StereoHealth:
     # or when it is too far off to be told.
     row_offset_px: float = math.nan
     row_offset_sigma_px: float = math.nan  # its standard error
+    # by how much the right picture is taller than the left one, over its height; NaN as above.
+    row_stretch: float = math.nan
+    row_stretch_sigma: float = math.nan  # its standard error
     n_points: int = 0  # that told
     # median over their windows, of both pictures' grey values; 0 when the rows are further off than
     # is looked for.
@@ -76,17 +84,18 @@ def measure_health(
     left, right = _picture_health(pair.left, box), _picture_health(pair.right, partner)
     if found is None:
         return StereoHealth(left, right)
-    offset_px, sigma_px, n_points, correlation = _rows(pair, found)
-    return StereoHealth(left, right, offset_px, sigma_px, n_points, correlation)
+    return StereoHealth(left, right, *_rows(pair, found))
 
 
-def _rows(pair: RectifiedPair, found: DisparityMap) -> tuple[float, float, int, float]:
-    """Median row offset, its standard error, number of points, median correlation.
+def _rows(
+    pair: RectifiedPair, found: DisparityMap
+) -> tuple[float, float, float, float, int, float]:
+    """Median row offset, stretch, each with its standard error, number of points, correlation.
 
     Steps are repeated from the common offset: single windows are too noisy to follow.
     """
     stride_px = max(_STRIDE_PX, math.ceil((found.n_matched / _MOST_POINTS) ** 0.5))
-    answers = np.empty((2 * _MOST_POINTS, 3))
+    answers = np.empty((2 * _MOST_POINTS, 5))
     offset_px = 0.0
     for _ in range(_MOST_STEPS):
         n = measure_rows(
@@ -95,18 +104,37 @@ def _rows(pair: RectifiedPair, found: DisparityMap) -> tuple[float, float, int, 
         )  # fmt: skip
         told = answers[:n][answers[:n, 1] < _WORST_SIGMA_PX]
         if len(told) < _FEWEST_POINTS:
-            return math.nan, math.nan, len(told), math.nan
+            return *_NO_ROWS, len(told), math.nan
         before_px, offset_px = offset_px, float(np.median(told[:, 0]))
         if abs(offset_px) > _LARGEST_PX:
-            return math.nan, math.nan, len(told), 0.0
+            return *_NO_ROWS, len(told), 0.0
         if abs(offset_px - before_px) < _SETTLED_PX:
             break
     correlation = float(np.median(told[:, 2]))
     if correlation < _LEAST_CORRELATION:
-        return math.nan, math.nan, len(told), correlation
+        return *_NO_ROWS, len(told), correlation
     spread_px = _MAD_TO_SIGMA * float(np.median(np.abs(told[:, 0] - offset_px)))
     sigma_px = _MEDIAN_TO_MEAN * spread_px / math.sqrt(len(told))
-    return offset_px, sigma_px, len(told), correlation
+    stretch, stretch_sigma = _fit_stretch(told[:, 0], told[:, 3:])
+    return offset_px, sigma_px, stretch, stretch_sigma, len(told), correlation
+
+
+def _fit_stretch(offsets_px: FloatArray, places_px: FloatArray) -> tuple[float, float]:
+    """How row offsets (N,) grow with the row of their points (N, 2), and its standard error.
+
+    They may grow with the column as well, as those of a camera that is turned in its plane do.
+    Least squares, with what lies more than three standard deviations off left out.
+    """
+    terms = np.column_stack([np.ones(len(places_px)), places_px - places_px.mean(axis=0)])
+    stays = np.ones(len(terms), dtype=np.bool_)
+    for _ in range(_STRETCH_ROUNDS):
+        solved, *_ = np.linalg.lstsq(terms[stays], offsets_px[stays], rcond=None)
+        off_px = np.abs(offsets_px - terms @ solved)
+        spread_px = _MAD_TO_SIGMA * float(np.median(off_px[stays]))
+        stays = off_px <= 3.0 * spread_px
+    inverse = np.linalg.pinv(terms[stays].T @ terms[stays])
+    alike = _ALIKE_PX / max(float(terms[stays, 2].std()), 1.0)
+    return float(solved[2]), math.hypot(spread_px * math.sqrt(float(inverse[2, 2])), alike)
 
 
 def _picture_health(picture: Image, box: Box) -> PictureHealth:

@@ -38,8 +38,8 @@ def measure_rows(
         place: column and row of its first pixel in the picture.
         layout: distance of points and radius of windows, px.
         row_shift_px: see above.
-        found: (n, 3) in place: the partner's rows below the point's, the standard deviation that
-            the residual gives it, and the correlation of l and r.
+        found: (n, 5) in place: the partner's rows below the point's, the standard deviation that
+            the residual gives it, the correlation of l and r, and the point's column and row.
 
     Returns:
         How many rows of `found` hold.
@@ -90,6 +90,7 @@ def measure_rows(
                             sums[a, b] += term[a] * term[b]
             if sums[0, 0] >= least and _solve(sums, found[n]):
                 found[n, 0] += row_shift_px
+                found[n, 3], found[n, 4] = place[0] + u, place[1] + v
                 n += 1
     return n
 

@@ -77,8 +77,7 @@ class PoseJudge:
         model = self._meter.model
         checks = frame.checks or PairChecks(self._meter, frame.pair)
         check = checks.check(fit.measured, fit.pose).result()
-        depth_mm = float(fit.pose.apply(model.centre_mm)[2])
-        known = self._evidence_of_pair(check.health, depth_mm)
+        known = self._evidence_of_pair(check.health, fit.pose.apply(model.centre_mm))
         looks = [self._look(frame, fit, check, goal, known)]
         # Too little may be left of a bone that was worked on: then all of its outline counts. On a
         # whole one that goes wrong: what is not measured lies under a hand.
@@ -168,14 +167,19 @@ class PoseJudge:
 
     def lost_in(self, frame: Frame) -> TrackedFrame:
         """The answer when nothing fits near the start of a frame, with what its pictures say."""
-        depth_mm = float(frame.start.apply(self._meter.model.centre_mm)[2])
-        disparity_px = self._meter.geometry.disparity_px(depth_mm)
-        known = self._evidence_of_pair(measure_health(frame.pair, None, disparity_px), depth_mm)
+        centre_mm = frame.start.apply(self._meter.model.centre_mm)
+        disparity_px = self._meter.geometry.disparity_px(float(centre_mm[2]))
+        known = self._evidence_of_pair(measure_health(frame.pair, None, disparity_px), centre_mm)
         verdict = decide(replace(known, missing=Reason.BONE_LOST))
         return TrackedFrame(self._meter.model.bone.name, None, verdict, frame.watch.timings)
 
-    def _evidence_of_pair(self, health: StereoHealth, depth_mm: float) -> Evidence:
-        """What the pictures themselves say against any pose at a depth."""
+    def _evidence_of_pair(self, health: StereoHealth, centre_mm: FloatArray) -> Evidence:
+        """What the pictures themselves say against any pose of a bone.
+
+        Args:
+            health: of the pair.
+            centre_mm: (3,) of the bone, in the rectified left camera.
+        """
         both = (health.left, health.right)
         dark = max(one.dark_fraction for one in both)
         saturated = max(one.saturated_fraction for one in both)
@@ -187,16 +191,21 @@ class PoseJudge:
         # A vertical disparity of v px shows that a camera was turned about the baseline. That costs
         # little, but it was probably turned as far about other axes, and a turn that moves a
         # picture sideways by v px moves the measured depth by z^2 / (f B) v.
-        geometry = self._meter.geometry
-        offset_px = abs(health.row_offset_px)
-        is_sure = offset_px > _SURE_SIGMAS * health.row_offset_sigma_px
-        row_error_mm = offset_px * depth_mm**2 / (geometry.focal_px * geometry.baseline_mm)
+        focal_px, baseline_mm = self._meter.geometry.focal_px, self._meter.geometry.baseline_mm
+        x_mm, depth_mm = float(centre_mm[0]), float(centre_mm[2])
+        offset_px = _sure(health.row_offset_px, health.row_offset_sigma_px)
+        offset_mm = offset_px * depth_mm**2 / (focal_px * baseline_mm)
+        # Where the right picture is taller, its camera stands nearer than it should, or has another
+        # focal length. Then it is wider as well: a point that lies f (x - B) / z beside its middle
+        # is seen off by the same share of that, and so is its disparity.
+        stretch = _sure(health.row_stretch, health.row_stretch_sigma)
+        stretch_mm = stretch * depth_mm * abs(x_mm - baseline_mm) / baseline_mm
         return Evidence(
             dark_fraction=dark,
             saturated_fraction=saturated,
             detail_ratio=detail_ratio,
             has_lost_rows=health.has_lost_rows,
-            row_error_mm=row_error_mm if is_sure else 0.0,
+            row_error_mm=max(offset_mm, stretch_mm),
             is_rig_accepted=self._is_rig_accepted,
         )
 
@@ -261,6 +270,11 @@ class PoseJudge:
             return float("inf")
         step = max(1, len(index) // _MOST_TARGETS)
         return estimate.predict_tre_mm(model.centre_mm, points_mm[index[::step]])
+
+
+def _sure(value: float, sigma: float) -> float:
+    """Its magnitude; 0 where that is not sure, or not known."""
+    return abs(value) if abs(value) > _SURE_SIGMAS * sigma else 0.0
 
 
 def _check_rows(health: StereoHealth, evidence: Evidence, verdict: Verdict) -> RowCheck | None:

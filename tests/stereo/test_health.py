@@ -14,21 +14,27 @@ BOX = Box(90, 10, 210, 96)
 DISPARITY_PX = 40.25
 
 
-def pair(row_offset_px: float = 0.0, noise: float = 1.5) -> RectifiedPair:
-    """A textured plane; the right picture shows it lower by so much."""
+def pair(
+    row_offset_px: float = 0.0, noise: float = 1.5, stretch: float = 0.0, turn_rad: float = 0.0
+) -> RectifiedPair:
+    """A textured plane; the right picture shows it lower by so much, taller, and turned."""
     rng = np.random.default_rng(3)
     fine = texture(4 * WIDTH, 4 * HEIGHT, 5)
     fine = cv2.GaussianBlur(fine, (0, 0), 4.0)
     fine = 128.0 + 40.0 * (fine - fine.mean()) / fine.std()
 
-    def seen(shift_x: float, shift_y: float) -> np.ndarray:
+    def seen(shift_x: float, shift_y: float, is_right: bool = False) -> np.ndarray:
         columns, rows = np.meshgrid(np.arange(WIDTH), np.arange(HEIGHT))
+        if is_right:
+            middle_x, middle_y = BOX.x + 0.5 * BOX.width - DISPARITY_PX, BOX.y + 0.5 * BOX.height
+            shift_y = shift_y + stretch * (rows - middle_y) + turn_rad * (columns - middle_x)
         x = (4.0 * (columns + shift_x)).astype(np.float32)
         y = (4.0 * (rows - shift_y)).astype(np.float32)
         values = cv2.remap(fine.astype(np.float32), x, y, cv2.INTER_CUBIC)
         return (values + rng.normal(0.0, noise, values.shape)).clip(0, 255).astype(np.uint8)
 
-    return RectifiedPair(seen(0.0, 0.0), seen(DISPARITY_PX, row_offset_px), geometry(), BOX)
+    right = seen(DISPARITY_PX, row_offset_px, is_right=True)
+    return RectifiedPair(seen(0.0, 0.0), right, geometry(), BOX)
 
 
 def matched(share: float = 0.7) -> DisparityMap:
@@ -51,6 +57,16 @@ def test_the_row_offset_is_found_within_its_own_error(row_offset_px: float) -> N
     )
     assert health.n_points > 60
     assert health.correlation > 0.95
+
+
+@pytest.mark.parametrize("stretch", [0.0, 0.002, -0.005, 0.01])
+@pytest.mark.parametrize("turn_rad", [0.0, 0.003])
+def test_a_taller_picture_is_told_whether_or_not_it_is_turned(
+    stretch: float, turn_rad: float
+) -> None:
+    health = measure_health(pair(0.3, stretch=stretch, turn_rad=turn_rad), matched(), DISPARITY_PX)
+    assert 0.0 < health.row_stretch_sigma < 3e-3
+    assert health.row_stretch == pytest.approx(stretch, abs=1e-4 + 0.25 * abs(stretch))
 
 
 @pytest.mark.parametrize("row_offset_px", [2.5, -2.9, 4.0, 6.0, -8.0])
@@ -77,6 +93,7 @@ def test_too_few_points_say_nothing_of_the_rows(share: float) -> None:
     health = measure_health(pair(0.5), matched(share), DISPARITY_PX)
     assert np.isnan(health.row_offset_px)
     assert np.isnan(health.row_offset_sigma_px)
+    assert np.isnan(health.row_stretch)
 
 
 def test_without_a_map_the_light_is_measured_alone() -> None:

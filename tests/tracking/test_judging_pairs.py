@@ -124,6 +124,20 @@ def test_a_rig_that_moved_is_never_ok(row_offset_px: float) -> None:
     assert reasons[0] is Reason.ROWS_DISAGREE
 
 
+@pytest.mark.parametrize("back_mm", few_of([4.0, -4.0]))
+def test_a_camera_that_stands_further_back_is_never_ok(back_mm: float) -> None:
+    """What it shows is smaller: its rows agree in the middle, and less and less beside it."""
+    a = room()
+    old = a.rig.right_from_left
+    moved = RigidTransform.from_parts(
+        "right", "left", old.rotation, old.translation_mm - (0.0, 0.0, back_mm)
+    )
+    tracker = BimccTracker(replace(a.rig, right_from_left=moved), a.tracker.model.bone)
+    status, reasons = tracked(tracker)
+    assert status is not Status.OK
+    assert Reason.ROWS_DISAGREE in reasons
+
+
 class Asked:
     """Stands for the search for a buried bone: counts how often it is asked, and finds none."""
 
