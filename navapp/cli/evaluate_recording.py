@@ -2,7 +2,6 @@
 
 import argparse
 from collections.abc import Sequence
-from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -194,14 +193,14 @@ def _read(
     diagnostics: Diagnostics,
 ) -> _Given:
     """All but the pictures, checked against each other and against the pictures' numbers."""
-    from drivers.replay_camera import open_source
     from navapp.cli.headless import check_accepted, check_start
     from navapp.cli.other_bones import find_stage_of
     from navapp.cli.recorded_operation import find_drawn_start
+    from navapp.cli.replay_truth import check_recorded_truth
     from navapp.cli.session_folder import is_session, read_session
     from navapp.control.prior_files import read_prior
     from navapp.control.stages import stage_by_name
-    from navapp.evaluation.recording.truth_files import check_truth, read_truth
+    from navapp.evaluation.recording.truth_files import read_truth
     from navapp.geometry.rig_files import read_rig
     from navapp.preop import read_plan
     from navapp.values import Prior
@@ -218,8 +217,7 @@ def _read(
     if session is not None and options.prior is None:
         prior = find_drawn_start(session, prior, stage.bone)
     check_start(prior, stage.bone)
-    with closing(open_source(sequence.source, False)) as source:
-        check_truth(truth, sequence.truth_path, source.numbers, stage.bone)
+    check_recorded_truth(truth, sequence.truth_path, sequence.source, stage.bone)
     rate_hz = configuration.camera.rate_hz if options.fps is None else options.fps
     return _Given(sequence, configuration, truth, rig, plan, prior, stage, rate_hz)
 

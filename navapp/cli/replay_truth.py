@@ -10,7 +10,7 @@ from navapp.errors import UsageError
 
 if TYPE_CHECKING:
     from navapp.control.frame_result import FrameResult
-    from navapp.evaluation.recording.truth_files import PoseTruth
+    from navapp.evaluation.recording.truth_files import PoseTruth, Truth
     from navapp.values import Plan
 
 
@@ -26,8 +26,7 @@ def read_replay_truth(options: argparse.Namespace, plan: "Plan", bone: str) -> "
         InputError: it cannot be read, or does not fit the recording.
         UsageError: it holds no poses of bones.
     """
-    from drivers.replay_camera import open_source
-    from navapp.evaluation.recording.truth_files import PoseTruth, check_truth, read_truth
+    from navapp.evaluation.recording.truth_files import PoseTruth, read_truth
 
     if options.truth is None:
         return None
@@ -38,9 +37,32 @@ def read_replay_truth(options: argparse.Namespace, plan: "Plan", bone: str) -> "
             subject=options.truth,
             remedy="score the recording with `navapp evaluate --recording`",
         )
-    with closing(open_source(options.sequence, options.split is not None)) as source:
-        check_truth(truth, options.truth, source.numbers, bone)
+    check_recorded_truth(
+        truth, options.truth, options.sequence, bone, is_split=options.split is not None
+    )
     return ReplayTruth(truth, plan)
+
+
+def check_recorded_truth(
+    truth: "Truth", path: str, recording: str, bone: str, *, is_split: bool = False
+) -> None:
+    """Refuse a truth that does not fit a recording, before any of its pictures is read.
+
+    Args:
+        truth: of the recording.
+        path: of the truth, for messages.
+        recording: folder or videos.
+        bone: that is followed.
+        is_split: one video holds both pictures.
+
+    Raises:
+        InputError: it speaks of pictures that there are not, or not of the bone.
+    """
+    from drivers.replay_camera import open_source
+    from navapp.evaluation.recording.truth_files import check_truth
+
+    with closing(open_source(recording, is_split)) as source:
+        check_truth(truth, path, source.numbers, bone)
 
 
 class ReplayTruth:

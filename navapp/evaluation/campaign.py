@@ -7,7 +7,6 @@ from functools import cache, partial
 from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar
 
-from navapp import __version__
 from navapp.environment import source_hash
 from navapp.errors import InputError, UsageError
 from navapp.evaluation.following import Answers
@@ -18,8 +17,8 @@ from navapp.evaluation.worst_frame import draw_worst_frame
 from navapp.geometry.whole_files import write_whole
 
 _SETTINGS, _TESTS, _TIMES, _PICTURES = "settings.json", "tests", "times", "pictures"
-# Settings that tell the code: results of two kinds of code do not belong into one table.
-_CODE = frozenset({"navapp", "source"})
+# Setting that tells the code: results of two kinds of code do not belong into one table.
+_SOURCE = "source"
 
 
 class KnownTest(Protocol):
@@ -104,7 +103,7 @@ class CampaignFolder(Generic[T]):
 
     def __init__(self, folder: str | Path, settings: Campaign[T]) -> None:
         self.path, self._settings = Path(folder), settings
-        wanted = {"navapp": __version__, "source": source_hash(), **settings.to_json()}
+        wanted = {_SOURCE: source_hash(), **settings.to_json()}
         kept = self.path / _SETTINGS
         if kept.is_file():
             _check_same(folder, _read_settings(kept), wanted)
@@ -236,9 +235,7 @@ def _check_same(folder: str | Path, kept: Any, wanted: Mapping[str, Any]) -> Non
     """Refuse to go on with another evaluation, or with other code."""
     if kept == wanted:
         return
-    if isinstance(kept, dict) and all(
-        kept.get(key) == wanted[key] for key in wanted.keys() - _CODE
-    ):
+    if isinstance(kept, dict) and {**kept, _SOURCE: wanted[_SOURCE]} == wanted:
         raise UsageError(
             f"{folder} was begun with other code of navapp",
             subject=str(folder),

@@ -17,9 +17,9 @@ from navapp.environment import source_hash
 
 @cache
 def describe_origin() -> str:
-    """One line: the code's version, commit and hash, versions of its libraries, the machine."""
+    """One line: version, hash and commit of the code, versions of its libraries, the machine."""
     commit = find_commit(Path(__file__).resolve().parents[2])
-    code = f"source {source_hash()}" if commit is None else f"commit {commit}"
+    code = f"source {source_hash()}" + ("" if commit is None else f", commit {commit}")
     return (
         f"navapp {__version__}, {code}; Python {platform.python_version()}, "
         f"numpy {np.__version__}, numba {version('numba')}, OpenCV {cv2.__version__}; "

@@ -70,7 +70,7 @@ class Evidence:
     has_lost_rows: bool = False  # too large a vertical disparity to be measured
     row_error_mm: float = 0.0  # in depth, that a sure vertical disparity stands for
     rms_ratio: float = math.nan  # rms of the fit's residuals over the one predicted
-    correlated_ratio: float = math.nan  # variance of residuals over that of right poses at most
+    correlated_ratio: float = math.nan  # variance of residuals over the tolerated one
     # Of points that do not know their noise (clouds; never in a tracker): width of the kernel at
     # the end over the widest, and correlated residuals less what a right pose leaves.
     kernel_fraction: float = math.nan
@@ -180,7 +180,7 @@ RULES = (
          lambda e: e.says(Reason.AMBIGUOUS), 0, None, CHOSEN, doubts_place=True),
     Rule(Reason.CUES_DISAGREE, "half of the outline is off by 3 sigma (yes 1)",
          lambda e: e.says(Reason.CUES_DISAGREE), 0, None, "tests.bench.outline"),
-    Rule(Reason.SURFACE_MISFIT, "variance of correlated residuals over the largest noise",
+    Rule(Reason.SURFACE_MISFIT, "variance of the residuals over the tolerated one",
          lambda e: e.correlated_ratio, 2.0, None, _RESIDUALS, doubts_place=True),
     Rule(Reason.COVERAGE_LOW, "what nothing hides: measured and agreeing",
          lambda e: e.seen.open_coverage, 0.2, 0.15, _JUDGE_LIMITS, is_below=True,

@@ -22,8 +22,9 @@ MODEL_SETTINGS = BimccSettings(narrowest_mm=0.2, n_sigmas=1.2)
 # Variance of residuals over the one that the matcher claims. So much do correct poses of simulated
 # femurs, which lie in the open, show at most (tests.bench.correlated_residuals).
 NOISE_VARIANCE_RATIO = 0.57**2
-# More than this is no noise. Chosen: glossy bones show more than femurs.
-LARGEST_NOISE_VARIANCE_RATIO = 0.65**2
+# Up to this, what residuals show beyond the noise is no sign of a misfit. Chosen: right poses of
+# glossy bones show more than femurs.
+TOLERATED_VARIANCE_RATIO = 0.65**2
 
 OnMeasured = Callable[[Measurement, RigidTransform], object]
 
@@ -83,11 +84,11 @@ class Fit:
         Noise is correlated over a matching window, l_model. Tissue that rises from the bone, or a
         model that lies half a millimetre off, leaves residuals that are correlated over
         centimetres, as errors of a free measurement are, l_free: no number of points averages them
-        out. With e = `variance_ratio` - `LARGEST_NOISE_VARIANCE_RATIO`, where positive, and
+        out. With e = `variance_ratio` - `TOLERATED_VARIANCE_RATIO`, where positive, and
         n^2 = `noise_variance_ratio`, the covariance grows by 1 + e / n^2 (l_free / l_model)^2, and
         with it the outline's part, which is then larger than it has to be.
         """
-        excess = max(0.0, self.variance_ratio - LARGEST_NOISE_VARIANCE_RATIO)
+        excess = max(0.0, self.variance_ratio - TOLERATED_VARIANCE_RATIO)
         lengths = FREE_CORRELATION_PX / MODEL_CORRELATION_PX
         growth = 1.0 + excess / noise_variance_ratio * lengths**2
         # The size's stays: what does not fit for another size is not to hide it.

@@ -21,7 +21,7 @@ from navapp.tracking.agreement import compare
 from navapp.tracking.checks import PairCheck, PairChecks
 from navapp.tracking.following import RestSettings
 from navapp.tracking.foreground import find_foreground
-from navapp.tracking.frame import LARGEST_NOISE_VARIANCE_RATIO, NOISE_VARIANCE_RATIO, Fit, Frame
+from navapp.tracking.frame import NOISE_VARIANCE_RATIO, TOLERATED_VARIANCE_RATIO, Fit, Frame
 from navapp.tracking.outline import OutlineMeter
 from navapp.tracking.settings import TrackerSettings
 from navapp.tracking.surface_meter import SurfaceMeter
@@ -217,7 +217,7 @@ class PoseJudge:
         is_on_model = fit.measured.rendered is not None
         correlated_ratio = math.nan
         if is_on_model:
-            correlated_ratio = fit.variance_ratio / LARGEST_NOISE_VARIANCE_RATIO
+            correlated_ratio = fit.variance_ratio / TOLERATED_VARIANCE_RATIO
         if not estimate.has_finite_covariance:
             return replace(known, estimate=estimate, correlated_ratio=correlated_ratio)
         if agreement is None or agreement.n_visible == 0:

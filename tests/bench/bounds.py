@@ -1,7 +1,8 @@
 """Errors of OK poses beside their bounds, by stage and situation, on the seeds of all choices.
 
 usage: python -m tests.bench.bounds [--stage STAGE] [--situation NAME] [--knees N] [--frames N]
-                                     [--first SEED] [--highlights X] [--knee-rows]
+                                     [--first SEED] [--highlights X] [--misses X]
+                                     [--knee-rows]
 
 The production tracker on simulated knees as `navapp evaluate` has them, of other seeds: what the
 judge's constants were chosen on. `navapp evaluate` reports on seeds that no choice has seen.
@@ -29,6 +30,7 @@ def main() -> None:
     parser.add_argument("--frames", type=int, default=6)
     parser.add_argument("--first", type=int, default=FIRST_SEED)
     parser.add_argument("--highlights", type=float, default=1.0, help="times the usual area")
+    parser.add_argument("--misses", type=float, default=1.0, help="of saw and drill, times usual")
     parser.add_argument("--knee-rows", action="store_true", help="a row for each knee as well")
     options = parser.parse_args()
     print(
@@ -52,12 +54,15 @@ def render_knee(
     first_seed: int,
     n_frames: int,
     highlights: float,
+    misses: float = 1.0,
 ) -> KnownSequence:
-    """A knee as `navapp evaluate` has them; with so many times the usual area of highlights."""
+    """A knee as `navapp evaluate` has them; with so many times the usual highlights and misses."""
     samples = tuple(SAMPLES)
     case = Case(samples[number % len(samples)], stage, situation)
     usual = CaseTest(case, number, first_seed + number).configure()
-    simulated = usual.camera.simulated.model_copy(update={"highlights": highlights})
+    simulated = usual.camera.simulated.model_copy(
+        update={"highlights": highlights, "misses": misses}
+    )
     camera = usual.camera.model_copy(update={"simulated": simulated})
     return render_room(usual.model_copy(update={"camera": camera}), stage, n_frames)
 
@@ -68,8 +73,9 @@ def _judge_cell(
     frames: list[FrameScore] = []
     for number in range(options.knees):
         sequence = render_knee(
-            stage, situation, number, options.first, options.frames + 1, options.highlights
-        )
+            stage, situation, number, options.first, options.frames + 1, options.highlights,
+            options.misses,
+        )  # fmt: skip
         found = follow(sequence, "bimcc").followed.frames
         if options.knee_rows:
             print(_row(f"{stage} {options.first + number}", situation, found), flush=True)

@@ -16,7 +16,7 @@ import numpy as np
 from navapp.evaluation import compute_mean_tre_mm
 from navapp.geometry.mesh import TriangleMesh
 from navapp.registration.verdict import Evidence, decide
-from navapp.tracking.frame import LARGEST_NOISE_VARIANCE_RATIO, NOISE_VARIANCE_RATIO
+from navapp.tracking.frame import NOISE_VARIANCE_RATIO, TOLERATED_VARIANCE_RATIO
 from navapp.values import BoneModel, Reason
 from sim_devices.scenario import Scenario
 from sim_devices.sensor import SensorModel
@@ -88,7 +88,7 @@ def fitted(seed: int, name: str) -> Iterator[Answer]:
             for one in (fit, shown)
         )
         error_mm = compute_mean_tre_mm(fit.pose, true, bone, _NO_TARGETS)
-        evidence = Evidence(correlated_ratio=shown.variance_ratio / LARGEST_NOISE_VARIANCE_RATIO)
+        evidence = Evidence(correlated_ratio=shown.variance_ratio / TOLERATED_VARIANCE_RATIO)
         is_misfit = Reason.SURFACE_MISFIT in decide(evidence).reasons
         ratio = shown.variance_ratio**0.5
         yield Answer(ratio, is_misfit, error_mm, *bounds_mm)

@@ -40,5 +40,5 @@ def test_what_is_no_checkout_has_none(tmp_path, monkeypatch) -> None:
 def test_the_line_names_code_libraries_and_machine() -> None:
     line = describe_origin()
     commit = find_commit(Path(__file__).resolve().parents[2])
-    for part in (__version__, commit or source_hash(), f"numpy {np.__version__}", " cores"):
+    for part in (__version__, commit or "", source_hash(), f"numpy {np.__version__}", " cores"):
         assert part in line

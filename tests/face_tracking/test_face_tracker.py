@@ -13,7 +13,7 @@ from navapp.face_tracking.face_plane import face_twists
 from navapp.geometry.directions import ViewCone
 from navapp.registration.verdict import Evidence, find_reasons
 from navapp.tracking import TrackerSettings, TrackState
-from navapp.tracking.frame import LARGEST_NOISE_VARIANCE_RATIO, Fit
+from navapp.tracking.frame import TOLERATED_VARIANCE_RATIO, Fit
 from navapp.tracking.methods import make_tracker
 from navapp.tracking.surface_meter import NEAR_BOX
 from navapp.values import (
@@ -127,7 +127,7 @@ def test_what_is_no_plane_does_not_fit(depth_mm) -> None:
     bowl_mm = depth_mm * (away_mm / np.percentile(away_mm, 95)) ** 2
     bent = replace(cloud, points_mm=cloud.points_mm + bowl_mm[:, None] * (0.0, 0.0, 1.0))
     estimate = tracker._search._fit_plane(replace(measured, make_cloud=lambda: bent), frame.start)
-    ratio = Fit(estimate, measured).variance_ratio / LARGEST_NOISE_VARIANCE_RATIO
+    ratio = Fit(estimate, measured).variance_ratio / TOLERATED_VARIANCE_RATIO
     is_misfit = Reason.SURFACE_MISFIT in find_reasons(Evidence(correlated_ratio=ratio))
     assert is_misfit == (depth_mm > 0.0)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from navapp.geometry.transform import RigidTransform
-from navapp.tracking.frame import LARGEST_NOISE_VARIANCE_RATIO, NOISE_VARIANCE_RATIO, Fit
+from navapp.tracking.frame import NOISE_VARIANCE_RATIO, TOLERATED_VARIANCE_RATIO, Fit
 from navapp.tracking.surface_meter import Measurement
 from navapp.values import PoseEstimate, SurfaceCloud
 from tests.tracking.meters import NO_MAP
@@ -34,7 +34,7 @@ def test_the_kernel_hides_nothing_of_the_residuals(ratio: float) -> None:
 
 def test_noise_counts_as_right_poses_show_it() -> None:
     assert pytest.approx(0.57**2) == NOISE_VARIANCE_RATIO
-    assert pytest.approx(0.65**2) == LARGEST_NOISE_VARIANCE_RATIO
+    assert pytest.approx(0.65**2) == TOLERATED_VARIANCE_RATIO
 
 
 @pytest.mark.parametrize("noise_variance_ratio", [0.57**2, 1.0])
@@ -62,6 +62,6 @@ def test_what_goes_together_over_40_px_counts_so_often(noise_variance_ratio: flo
 def test_residuals_that_the_kernel_steps_off_show_the_most() -> None:
     saturated = fit_of(0.9)
     saturated = replace(saturated, estimate=replace(saturated.estimate, rms_mm=1.0))
-    limit = 2.0 * LARGEST_NOISE_VARIANCE_RATIO
+    limit = 2.0 * TOLERATED_VARIANCE_RATIO
     assert saturated.variance_ratio > limit
     assert fit_of(0.95).variance_ratio > limit > fit_of(0.8).variance_ratio

@@ -147,7 +147,7 @@ _PLAN_AXES = (
 )  # fmt: skip
 
 # Of each number of a camera: its unit, and levels that move points of the picture's outer parts by
-# some tenths of a pixel to several pixels, so that OK ends among them.
+# some tenths of a pixel to several pixels.
 _NUMBERS = {
     "fx": ("%", (0.0, 0.05, 0.1, 0.2, 0.5, 1.0)),
     "fy": ("%", (0.0, 0.05, 0.1, 0.2, 0.5, 1.0)),

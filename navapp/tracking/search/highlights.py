@@ -29,7 +29,7 @@ from navapp.tracking.surface_meter import (
 from navapp.values import DisparityMap
 
 # How far both are off, over what they claim and over the 0.65 beyond which residuals are no noise
-# (`LARGEST_NOISE_VARIANCE_RATIO`): pictures without highlights have less texture, and where they
+# (`TOLERATED_VARIANCE_RATIO`): pictures without highlights have less texture, and where they
 # answer nothing, grey ones see the highlights (tests.bench.bone_highlights).
 _MATTE_ALONE, _GREY_ALONE = np.float32(1.5), np.float32(2.0)
 # Spread of the differences between both answers, over what both claim, and pixels that are answered
