@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.registration.bimcc_kernels import (
+    NEARLY,
     BimccSettings,
     LoopState,
     choose_first_sigma_mm,
@@ -24,6 +25,7 @@ from navapp.registration.model import RegistrationModel
 from navapp.registration.pairing_kernels import Pose, make_pairs, measure_pairs, pair_forward
 from navapp.registration.scene import NO_GRID, Scene
 from navapp.registration.step_kernels import noise_under_kernel_mm2, weigh
+from navapp.registration.thickness import ThicknessField, ThicknessFit
 from navapp.values import PoseEstimate, Reason
 
 DEFAULT = BimccSettings()
@@ -33,6 +35,8 @@ MIN_POINTS = 60
 _REACH_SIGMAS, _NOISE_ROUNDS = 4.0, 20
 # A first kernel of this width means a start some millimetres off.
 _NEAR_SIGMA_MM = 5.0
+# Of a fit of pose and thickness: rounds under a wide kernel, and all of them.
+_WIDE_ROUNDS, _MOST_THICKNESS_ROUNDS = 2, 20
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,6 +76,9 @@ def solve_bimcc(
     if len(scene) < MIN_POINTS:
         return fit.too_few_points(len(scene))
     iterations, is_converged = fit.run()
+    if scene.tells_shape and is_converged and model.thickness is not None:
+        n_rounds, is_converged = fit.fit_thickness(model.thickness)
+        iterations += n_rounds
     return fit.solution(iterations, is_converged=is_converged)
 
 
@@ -136,6 +143,7 @@ class _Fit:
         n_coarse = len(scene) // scene.every + 1 + 2 * settings.model_points
         self._pairs = make_pairs(max(len(scene), n_coarse))
         self._n, self._sigma_mm = 0, 0.0
+        self._thickness: ThicknessFit | None = None  # where it was fitted with the pose
 
     @property
     def pose(self) -> RigidTransform:
@@ -157,6 +165,30 @@ class _Fit:
         self._has_moved = True
         self._n, self._sigma_mm = fine.n_pairs, fine.sigma_mm
         return coarse.iterations + fine.iterations, fine.has_finished
+
+    def fit_thickness(self, field: ThicknessField) -> tuple[int, bool]:
+        """Pose and cartilage together, from where the loops ended: how many steps, whether at rest.
+
+        At first the kernel is as wide as the plan's deviation, to reach what the thickness
+        explains; then as narrow as the noise.
+        """
+        pairs, settings = self._pairs, self._settings
+        fit = self._thickness = ThicknessFit(field, pairs, self._n)
+        is_at_rest, n_rounds = False, 0
+        while not is_at_rest and n_rounds < _MOST_THICKNESS_ROUNDS:
+            self.pair(self._sigma_mm)
+            is_wide = n_rounds < _WIDE_ROUNDS
+            residual_mm = fit.take_out(pairs, self._n)
+            fit.weigh(pairs, self._n, self._sigma_mm, settings.n_sigmas, is_wide=is_wide)
+            turn_rad, shift_mm = fit.step(
+                pairs, self._n, residual_mm, self._scene.n_sharing_errors, self._pose
+            )
+            is_small = (
+                turn_rad < NEARLY * settings.stop_rad and shift_mm < NEARLY * settings.stop_mm
+            )
+            is_at_rest = is_small and not is_wide
+            n_rounds += 1
+        return n_rounds, is_at_rest
 
     def run_coarse(self) -> LoopState:
         """The coarse loop, on thinned points; forward pairs only when the start is near."""
@@ -206,7 +238,7 @@ class _Fit:
 
     def solution(self, iterations: int, *, is_converged: bool) -> Solution:
         """The pose with the figures of its pairs, of those within reach of the kernel."""
-        pairs, n, near = self._pairs, self._n, self.find_near()
+        pairs, n, near, thickness = self._pairs, self._n, self.find_near(), self._thickness
         n_near = int(np.count_nonzero(near.is_near))
         if n_near < MIN_POINTS:
             return self.too_few_points(n_near, iterations)
@@ -216,7 +248,8 @@ class _Fit:
         information = compute_information(
             pairs._replace(direction=self._model.smooth_normals.take(pairs.vertex[:n], axis=0)),
             n, pose, self._model.centre_mm, self._scene.n_sharing_errors,
-            tells_size=self._scene.tells_size,
+            tells_size=self._scene.tells_shape,
+            thickness_rows_mm=None if thickness is None else thickness.rows_mm,
         )  # fmt: skip
         reasons = [] if is_converged else [Reason.NOT_CONVERGED]
         reasons += [Reason.DEGENERATE] * information.is_degenerate
@@ -232,6 +265,7 @@ class _Fit:
             is_converged=is_converged,
             reasons=tuple(reasons),
             sized=information.sized,
+            thickness_ratio=None if thickness is None else thickness.find_ratio(pairs.weight[:n]),
         )
         fits = np.flatnonzero(near.distance_mm < near.sigma_mm)
         points_mm, residual_mm = pairs.point.take(fits, axis=0), pairs.residual[fits]

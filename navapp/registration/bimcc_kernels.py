@@ -23,7 +23,7 @@ _FACING = 0.2
 _FEWEST_PAIRS = 6
 # Pairs that flip to and fro never let the last step become small: so many steps in a row below so
 # many times the limit will do.
-_SMALL_STEPS, _NEARLY = 5, 5.0
+_SMALL_STEPS, NEARLY = 5, 5.0
 # The pose has followed a kernel when its step is below this angle and this fraction of the kernel.
 _FOLLOWED_RAD, _FOLLOWED_FRACTION = 0.02, 0.15
 # Noise stays when the kernel is halved; what a wrong pose leaves shrinks by nearly as much.
@@ -157,7 +157,7 @@ def run_fine_loop(
             sigma_mm = follow_noise_mm(noise_mm, sigma_mm, settings)
         is_small = turn_rad < settings.stop_rad and shift_mm < settings.stop_mm
         is_nearly_small = (
-            turn_rad < _NEARLY * settings.stop_rad and shift_mm < _NEARLY * settings.stop_mm
+            turn_rad < NEARLY * settings.stop_rad and shift_mm < NEARLY * settings.stop_mm
         )
         n_small = n_small + 1 if is_nearly_small else 0
         if sigma_mm == last_mm and (is_small or n_small >= _SMALL_STEPS):

@@ -10,10 +10,12 @@ from navapp.geometry.transform import FloatArray, RigidTransform, skew
 from navapp.registration.pairing_kernels import Pairs
 from navapp.registration.step_kernels import (
     FREE_FRACTION,
+    find_motion_rows,
     find_weighted_centre,
     sum_plane_system,
     sum_size_terms,
 )
+from navapp.registration.thickness import sum_thickness
 from navapp.values import SizedPose
 
 # Chosen, as all that names no source.
@@ -61,17 +63,22 @@ def compute_information(
     n_sharing_errors: float,
     *,
     tells_size: bool = False,
+    thickness_rows_mm: FloatArray | None = None,
 ) -> Information:
     """Information of the first n pairs, weighted by kernel over variance, about `scene_from_bone`.
 
     Pairs and the model's centre (3,) are in bone coordinates. So many neighbouring pairs as
     `n_sharing_errors` have their errors in common. With `tells_size` pose and size fitted together
-    are told as well.
+    are told as well. With `thickness_rows_mm` (n, k), by how much the residuals fall with standard
+    normal unknowns of the cartilage, it is the information with those fitted.
 
     Source: Gauss-Newton normal equations at the solution; their inverse is the covariance.
     """
     seen_mm, lever_mm = find_weighted_centre(pairs, n)
-    H, _ = sum_plane_system(pairs, n, seen_mm, lever_mm)
+    sized_H, g = _sum_sized_system(pairs, n, seen_mm, lever_mm)
+    if thickness_rows_mm is not None:
+        sized_H -= _sum_explained(pairs, n, seen_mm, lever_mm, thickness_rows_mm, n_sharing_errors)
+    H: FloatArray = sized_H[:6, :6]
     eigenvalues, vectors = np.linalg.eigh(H)
     is_free = _are_free(eigenvalues)
     # (rotation x lever, translation) of the points become (translation, rotation) of the pose.
@@ -82,14 +89,13 @@ def compute_information(
         return Information(np.diag([np.inf] * 6), free)
     arm_mm = pose.rotation @ (centre_mm - seen_mm)
     change = _pose_by_points(pose.rotation, lever_mm, arm_mm)
-    of_pose, inverse = change[:6, :6], np.linalg.inv(H)
+    of_pose, inverse = change[:6, :6], np.asarray(np.linalg.inv(H), dtype=np.float64)
     covariance = n_sharing_errors * _propagate(of_pose, inverse)
     if not tells_size:
         return Information(covariance, free)
     # The size as a seventh unknown; where the pairs do not fix it, as expected.
-    H, g = _sum_sized_system(pairs, n, seen_mm, lever_mm)
-    H[6, 6] += n_sharing_errors / (_SIZE_SD * lever_mm) ** 2
-    inverse = np.asarray(np.linalg.inv(H), dtype=np.float64)
+    sized_H[6, 6] += n_sharing_errors / (_SIZE_SD * lever_mm) ** 2
+    inverse = np.asarray(np.linalg.inv(sized_H), dtype=np.float64)
     sized = SizedPose(
         change @ (inverse @ -g),
         n_sharing_errors * _propagate(change, inverse),
@@ -129,6 +135,25 @@ def _sum_sized_system(
     H[:6, 6] = H[6, :6] = -mixed
     H[6, 6], g[6] = squares, -product_mm
     return H, g
+
+
+def _sum_explained(
+    pairs: Pairs,
+    n: int,
+    centre_mm: FloatArray,
+    lever_mm: float,
+    thickness_rows_mm: FloatArray,
+    n_sharing_errors: float,
+) -> FloatArray:
+    """(7, 7) of the information of motion and growth: what the thickness explains as well."""
+    weight = pairs.weight[:n]
+    offsets_mm = pairs.point[:n] - centre_mm
+    outward = (offsets_mm * pairs.direction[:n]).sum(axis=1) / lever_mm
+    rows = np.column_stack([find_motion_rows(pairs, n, centre_mm, lever_mm), -outward])
+    mixed = rows.T @ (weight[:, None] * thickness_rows_mm)
+    own = sum_thickness(thickness_rows_mm, weight, n_sharing_errors)
+    explained: FloatArray = mixed @ np.linalg.solve(own, mixed.T)
+    return explained
 
 
 def _are_free(eigenvalues: FloatArray) -> NDArray[np.bool_]:

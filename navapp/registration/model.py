@@ -15,6 +15,7 @@ from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.vertex_neighbourhoods import compute_curvature, find_neighbours
 from navapp.geometry.zbuffer import RenderedView, render_rectified
 from navapp.registration.lookup_kernels import ModelArrays, VoxelGrid, fill_model_grid
+from navapp.registration.thickness import ThicknessField
 from navapp.values import BoneModel
 
 # All chosen: of the grid of nearest vertices, and of the smoothed normals.
@@ -56,6 +57,11 @@ class RegistrationModel:
         """`seen_mesh` in fewer triangles where it has many, and its lid: what is rendered."""
         mesh, lid = drawn(self.seen_mesh), self.bone.lid
         return mesh if lid is None else join_meshes(mesh, lid).without_unused_vertices()
+
+    @cached_property
+    def thickness(self) -> ThicknessField | None:
+        """What the cartilage may differ from the plan by; None where the plan is sure of it."""
+        return ThicknessField.over(self.points_mm, self.bone.cartilage_sd_mm)
 
     @cached_property
     def _n_outward(self) -> int:

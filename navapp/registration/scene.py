@@ -33,19 +33,19 @@ class Scene:
     sigma_ray_mm: FloatArray | None = None
     # so many neighbouring points have their errors in common and count as one.
     n_sharing_errors: float = 1.0
-    tells_size: bool = False  # a fit to it tells the bone's size beside its pose
+    tells_shape: bool = False  # a fit to it tells size and cartilage beside the pose
     thinned_to: int = 500  # the coarse loop uses about so many points
 
     @classmethod
     def from_stereo(
-        cls, cloud: SurfaceCloud, correlation_px: float, *, tells_size: bool = False
+        cls, cloud: SurfaceCloud, correlation_px: float, *, tells_shape: bool = False
     ) -> "Scene":
         """A cloud in the rectified left camera, whose errors go together over a distance.
 
-        `tells_size`: as of the scene.
+        `tells_shape`: as of the scene.
         """
         n_sharing_errors = max(1.0, (correlation_px / cloud.stride_px) ** 2)
-        return cls(cloud.points_mm, np.zeros(3), cloud.sigma_ray_mm, n_sharing_errors, tells_size)
+        return cls(cloud.points_mm, np.zeros(3), cloud.sigma_ray_mm, n_sharing_errors, tells_shape)
 
     def __post_init__(self) -> None:
         points = np.asarray(self.points_mm)

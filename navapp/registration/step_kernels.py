@@ -101,6 +101,15 @@ def set_motion_row(
 
 
 @njit(cache=True, nogil=True)
+def find_motion_rows(pairs: Pairs, n: int, centre: FloatArray, lever_mm: float) -> FloatArray:
+    """(n, 6) how the first n residuals grow with the motion."""
+    rows = np.empty((n, 6))
+    for i in range(n):
+        set_motion_row(pairs, i, centre, lever_mm, rows[i])
+    return rows
+
+
+@njit(cache=True, nogil=True)
 def mirror(H: FloatArray) -> None:
     """Copy the upper triangle into the lower one, in place."""
     for a in range(len(H)):

@@ -79,7 +79,7 @@ class Evidence:
     is_rig_accepted: bool = True  # by its calibration
     size_excess_mm: float = math.nan  # the bone surely has another size, by more than may be
     seen_error_mm: float = math.nan  # bound of the error by what is seen
-    plan_mm: float = math.nan  # bound of the error by the plan: its cartilage and surface
+    plan_mm: float = math.nan  # bound of what the plan's cartilage and surface may be off by
     bound_mm: float | None = None  # bound of the error by all that is known; None without a pose
     motion_mm: float = math.nan  # that motion between rows and eyes may cost
     cartilage_sd_mm: float = math.nan  # rms over the seen surface
@@ -109,6 +109,17 @@ class Evidence:
         """By which what is seen fixes the pose too loosely."""
         limit_mm = math.nan if self.goal is None else self.goal.seen_limit_mm
         return self.seen_error_mm - math.hypot(limit_mm, self.plan_mm)
+
+    @property
+    def thickness_ratio(self) -> float:
+        """As of the estimate; NaN where thickness was not fitted."""
+        ratio = None if self.estimate is None else self.estimate.thickness_ratio
+        return math.nan if ratio is None else ratio
+
+    @property
+    def spread_ratio(self) -> float:
+        """Of measured differences; NaN where thickness, which they still hold, was fitted."""
+        return self.seen.spread_ratio if math.isnan(self.thickness_ratio) else math.nan
 
     @property
     def tolerance_excess_mm(self) -> float:
@@ -194,7 +205,7 @@ RULES = (
     Rule(Reason.SURFACE_MISFIT, "rms of the fit's residual over the predicted one",
          lambda e: e.rms_ratio, 1.25, 2.0, _PARTLY_CHOSEN, doubts_place=True),
     Rule(Reason.SURFACE_MISFIT, "spread of all differences over the claimed sigma",
-         lambda e: e.seen.spread_ratio, 1.1, None, CHOSEN, doubts_place=True),
+         lambda e: e.spread_ratio, 1.1, None, CHOSEN, doubts_place=True),
     Rule(Reason.SURFACE_MISFIT, "width of the kernel at the end over the widest",
          lambda e: e.kernel_fraction, None, 0.95, CHOSEN, doubts_place=True),
     Rule(Reason.SURFACE_MISFIT, "correlated residuals 3 mm apart less 0.2 mm, mm",
@@ -211,6 +222,9 @@ RULES = (
          lambda e: e.motion_mm, OK_ERROR_MM, None, CHOSEN),
     Rule(Reason.CARTILAGE_UNCERTAIN, "rms deviation of the cartilage, mm",
          lambda e: e.cartilage_sd_mm, 0.45, None,
+         "chosen; compared in tests.bench.cartilage"),
+    Rule(Reason.CARTILAGE_UNCERTAIN, "rms difference of its thickness over the plan's deviation",
+         lambda e: e.thickness_ratio, 0.9, None,
          "chosen; compared in tests.bench.cartilage"),
     Rule(Reason.TRE_TOO_LARGE, "95 % bound over the stage's tolerance, mm",
          lambda e: e.tolerance_excess_mm, 0, None, CHOSEN),

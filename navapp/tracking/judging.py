@@ -156,9 +156,11 @@ class PoseJudge:
         """Variance that counts as noise over the one that a fit on the model claims.
 
         For a bone in the open it is what correct poses show at most. For a hidden one it is
-        what is claimed: something flush with the bone may fit as well.
+        what is claimed: something flush with the bone may fit as well. So it is of a bone whose
+        cartilage was fitted: most of that covariance is the plan's, which is no noise.
         """
-        return NOISE_VARIANCE_RATIO if agreement.lies_open else 1.0
+        is_noise = agreement.lies_open and fit.estimate.thickness_ratio is None
+        return NOISE_VARIANCE_RATIO if is_noise else 1.0
 
     def lost(self, reason: Reason, watch: Stopwatch) -> TrackedFrame:
         """The answer when there is no fit to judge."""
@@ -225,12 +227,14 @@ class PoseJudge:
         is_seen = model.bone.mesh.visible_vertices(estimate.camera_from_bone)
         seen_sd_mm = model.bone.cartilage_sd_mm[is_seen]
         cartilage_sd_mm = float(np.sqrt(np.mean(seen_sd_mm**2))) if len(seen_sd_mm) else 0.0
-        plan_mm = _COMMON_ERROR_SIGMAS * math.hypot(cartilage_sd_mm, model.bone.surface_sd_mm)
+        surface_mm = _COMMON_ERROR_SIGMAS * model.bone.surface_sd_mm
+        plan_mm = math.hypot(_COMMON_ERROR_SIGMAS * cartilage_sd_mm, surface_mm)
         seen_error_mm = self._bound_mm(estimate, goal.targets_mm, is_seen)
         motion_mm = 0.0 if frame.times is None else frame.times.error_mm(fit.pose)
         depth_mm = float(fit.pose.apply(model.centre_mm)[2])
         rig_mm = 0.0 if self._quality is None else self._quality.error_mm(depth_mm)
-        bound_mm = math.hypot(seen_error_mm, plan_mm, rig_mm, motion_mm)
+        unseen_mm = plan_mm if estimate.thickness_ratio is None else surface_mm
+        bound_mm = math.hypot(seen_error_mm, unseen_mm, rig_mm, motion_mm)
         size_excess_mm = math.nan
         if (sized := estimate.sized) is not None:
             # Errors of a cartilage's thickness that go together look like another size.

@@ -191,6 +191,7 @@ class OutlineMeter:
         inner = pixel[:, None] - _INSIDE_PX[:, None] * rim.normal[:, None]
         is_measured = look_up(measured.origin, inner, box, 0) == Origin.MATCHED
         is_free: NDArray[np.bool_] = is_measured.mean(axis=1) >= _LEAST_INSIDE
+        is_free &= self._model.bone.cartilage_sd_mm[rim.vertex] == 0.0
         if coarse_px is not None:
             beside_px = look_up(coarse_px, pixel + _BESIDE_PX * rim.normal, box, np.nan)
             rim_px = self._geometry.disparity_map_px(rim.point[:, 2])

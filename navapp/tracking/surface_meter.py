@@ -90,8 +90,8 @@ class Measurement:
     @property
     def scene(self) -> Scene:
         """The cloud, to be registered to."""
-        tells_size = self.rendered is not None
-        return Scene.from_stereo(self.cloud, self.correlation_px, tells_size=tells_size)
+        tells_shape = self.rendered is not None
+        return Scene.from_stereo(self.cloud, self.correlation_px, tells_shape=tells_shape)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

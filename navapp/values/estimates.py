@@ -94,6 +94,9 @@ class PoseEstimate:
     # The pose in the size that is seen; what it shifts points by is in all predicted errors. None
     # where the size is taken as it is: of what was not measured on the model.
     sized: SizedPose | None = None
+    # rms of what the seen cartilage is thicker or thinner than planned, over the deviation that the
+    # plan claims. None: thickness was not fitted, and the covariance knows nothing of its errors.
+    thickness_ratio: float | None = None
 
     @property
     def has_finite_covariance(self) -> bool:

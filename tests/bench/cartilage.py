@@ -97,6 +97,16 @@ def mapped(known: Patient) -> BoneModel:
     return _mapped(known, np.where(known.thickness_mm > 0.0, thickness, 0.0))
 
 
+def thicker(by_mm: float) -> Callable[[Patient], BoneModel]:
+    """The plan's cartilage is thicker than the true one, by as much everywhere."""
+
+    def make(known: Patient) -> BoneModel:
+        is_covered = known.thickness_mm > 0.0
+        return _mapped(known, np.where(is_covered, known.thickness_mm + by_mm, 0.0))
+
+    return make
+
+
 def one_mean(known: Patient) -> BoneModel:
     """The plan knows how thick it is on the joint surfaces on average."""
     return make_even_cartilage(BoneModel("femur", known.mesh, known.side), MEAN_MM, SPREAD_MM)
@@ -118,6 +128,8 @@ BARE = "bare bone"
 PLANS: dict[str, Callable[[Patient], BoneModel]] = {
     "thickness exact": exact,
     "thickness per vertex, 0.4 mm off": mapped,
+    "0.4 mm too thick everywhere": thicker(0.4),
+    "0.8 mm too thick everywhere": thicker(0.8),
     "one mean, 2.0:0.6": one_mean,
     "one mean, on the joint surfaces only": one_mean_on_joints,
     "no offset": unknown,

@@ -132,7 +132,7 @@ def test_a_single_point_fixes_one_direction_of_six() -> None:
 
 def on_model(points_mm: np.ndarray, sigma_ray_mm: np.ndarray) -> Scene:
     """Points that tell the size, as those that were measured on a model."""
-    return Scene(points_mm, np.zeros(3), sigma_ray_mm, tells_size=True)
+    return Scene(points_mm, np.zeros(3), sigma_ray_mm, tells_shape=True)
 
 
 @pytest.mark.parametrize("size", [0.97, 1.0, 1.03])

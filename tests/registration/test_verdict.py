@@ -63,6 +63,10 @@ def degenerate(value: float) -> Evidence:
     return known(estimate=free) if value <= 1 else Evidence(estimate=LOOSE)
 
 
+def fitted_thickness(ratio: float) -> Evidence:
+    return known(estimate=replace(ESTIMATE, thickness_ratio=ratio))
+
+
 @dataclass(frozen=True)
 class Row:
     """A reason, evidence with a value of what it looks at, and the limits; `step` is just beyond.
@@ -107,6 +111,7 @@ ROWS = (
     Row(Reason.POSE_UNCERTAIN, lambda x: known(seen_error_mm=x + 0.5), 0, None),
     Row(Reason.MOTION_UNKNOWN, lambda x: known(motion_mm=x), 0.5, None),
     Row(Reason.CARTILAGE_UNCERTAIN, lambda x: known(cartilage_sd_mm=x), 0.45, None),
+    Row(Reason.CARTILAGE_UNCERTAIN, fitted_thickness, 0.9, None),
     Row(Reason.TRE_TOO_LARGE, lambda x: known(bound_mm=x + 2.0), 0, None),
     Row(Reason.JUMPED, lambda x: known(jump_mm=x), 12.0, None),
     Row(Reason.JUMPED, lambda x: known(jump_deg=x), 10.0, None),
@@ -253,6 +258,12 @@ def test_what_the_plan_costs_is_not_held_against_the_view() -> None:
         (),
     )
     assert GOAL.seen_limit_mm == OK_ERROR_MM == 0.5
+
+
+def test_what_a_fitted_thickness_explains_is_no_spread() -> None:
+    wide = seen(spread_ratio=1.2)
+    assert told(wide) == (Status.DEGRADED, (Reason.SURFACE_MISFIT,))
+    assert told(replace(wide, estimate=replace(ESTIMATE, thickness_ratio=0.8)))[1] == ()
 
 
 @pytest.mark.parametrize(

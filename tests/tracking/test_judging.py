@@ -209,6 +209,19 @@ def test_what_the_plans_surface_may_be_off_is_in_the_bound() -> None:
     assert known == pytest.approx(np.hypot(plain, 2.0 * 0.2))
 
 
+def test_a_thickness_that_was_fitted_is_in_the_covariance_and_is_no_noise() -> None:
+    """The plan's deviation is not added once more, and no part of the covariance is left out."""
+    sd_mm = np.full(len(BONE.mesh.vertices_mm), 0.35)
+    model = RegistrationModel(replace(BONE, cartilage_sd_mm=sd_mm))
+    estimate = replace(estimate_on(model=model), thickness_ratio=0.5)
+    bounds_mm = [
+        judged(one, model=model).verdict.predicted_tre_mm
+        for one in (estimate, replace(estimate, thickness_ratio=None))
+    ]
+    assert bounds_mm[0] < bounds_mm[1]
+    assert np.sqrt(bounds_mm[1] ** 2 - bounds_mm[0] ** 2) == pytest.approx(2.0 * 0.35, rel=0.02)
+
+
 def judged_with_size(size_mm: float, sigma_mm: float, model=MODEL) -> Verdict:
     step = np.append(np.zeros(6), size_mm)
     covariance = np.diag([*[1e-4] * 6, sigma_mm**2])
@@ -245,7 +258,7 @@ def test_the_right_bone_has_the_right_size_and_a_larger_one_has_not() -> None:
     for size, reasons in ((1.0, False), (0.95, True)):
         scaled = mesh.centroid_mm + size * (mesh.vertices_mm - mesh.centroid_mm)
         model = RegistrationModel(replace(BONE, mesh=replace(mesh, vertices_mm=scaled)))
-        scene = replace(scene_of(MAP), tells_size=True)
+        scene = replace(scene_of(MAP), tells_shape=True)
         verdict = judged(fit_bimcc(scene, model, TRUE, FREE_SETTINGS), model=model).verdict
         assert (Reason.SIZE_DIFFERS in verdict.reasons) == reasons
 
