@@ -74,6 +74,7 @@ class _OccludedModel(RegistrationModel):
     def __init__(self, model: RegistrationModel, occluder: Occluder) -> None:
         # Made once for all pairs of pictures.
         _ = model.arrays, model.rendered_mesh, model.rendered_face_sigma_mm, model.hull_mm
+        _ = model.thickness
         self.__dict__.update(model.__dict__)
         self._occluder = occluder
 

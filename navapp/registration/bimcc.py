@@ -20,12 +20,12 @@ from navapp.registration.bimcc_kernels import (
     run_coarse_loop,
     run_fine_loop,
 )
+from navapp.registration.cartilage_fit import KernelWidth, ThicknessField, ThicknessFit
 from navapp.registration.information import Information, compute_information
 from navapp.registration.model import RegistrationModel
 from navapp.registration.pairing_kernels import Pose, make_pairs, measure_pairs, pair_forward
 from navapp.registration.scene import NO_GRID, Scene
 from navapp.registration.step_kernels import noise_under_kernel_mm2, weigh
-from navapp.registration.thickness import ThicknessField, ThicknessFit
 from navapp.values import PoseEstimate, Reason
 
 DEFAULT = BimccSettings()
@@ -76,7 +76,8 @@ def solve_bimcc(
     if len(scene) < MIN_POINTS:
         return fit.too_few_points(len(scene))
     iterations, is_converged = fit.run()
-    if scene.tells_shape and is_converged and model.thickness is not None:
+    tells_thickness = scene.tells_shape and scene.knows_noise and is_converged
+    if tells_thickness and model.thickness is not None:
         n_rounds, is_converged = fit.fit_thickness(model.thickness)
         iterations += n_rounds
     return fit.solution(iterations, is_converged=is_converged)
@@ -85,7 +86,10 @@ def solve_bimcc(
 def fit_pose(
     scene: Scene, model: RegistrationModel, start: RigidTransform, settings: BimccSettings
 ) -> RigidTransform | None:
-    """The pose of `fit_bimcc` alone, which is sooner found; None when too few points pair."""
+    """The pose of `fit_bimcc` alone, which is sooner found; None when too few points pair.
+
+    An error of the cartilage's thickness stays in it.
+    """
     fit = _Fit(scene, model, start, settings)
     if len(scene) < MIN_POINTS:
         return None
@@ -172,20 +176,17 @@ class _Fit:
         At first the kernel is as wide as the plan's deviation, to reach what the thickness
         explains; then as narrow as the noise.
         """
-        pairs, settings = self._pairs, self._settings
-        fit = self._thickness = ThicknessFit(field, pairs, self._n)
-        is_at_rest, n_rounds = False, 0
+        fit, settings = ThicknessFit(field, self._pairs, self._n), self._settings
+        if len(fit.unknowns) == 0:
+            return 0, True
+        self._thickness, is_at_rest, n_rounds = fit, False, 0
         while not is_at_rest and n_rounds < _MOST_THICKNESS_ROUNDS:
             self.pair(self._sigma_mm)
             is_wide = n_rounds < _WIDE_ROUNDS
-            residual_mm = fit.take_out(pairs, self._n)
-            fit.weigh(pairs, self._n, self._sigma_mm, settings.n_sigmas, is_wide=is_wide)
-            turn_rad, shift_mm = fit.step(
-                pairs, self._n, residual_mm, self._scene.n_sharing_errors, self._pose
-            )
-            is_small = (
-                turn_rad < NEARLY * settings.stop_rad and shift_mm < NEARLY * settings.stop_mm
-            )
+            kernel = KernelWidth(self._sigma_mm, settings.n_sigmas, is_wide)
+            sharing = self._scene.n_sharing_errors
+            turn_rad, shift_mm = fit.step(self._pairs, self._n, kernel, sharing, self._pose)
+            is_small = max(turn_rad / settings.stop_rad, shift_mm / settings.stop_mm) < NEARLY
             is_at_rest = is_small and not is_wide
             n_rounds += 1
         return n_rounds, is_at_rest

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from navapp.geometry.transform import FloatArray, RigidTransform, skew
+from navapp.registration.cartilage_fit import solve_out_thickness
 from navapp.registration.pairing_kernels import Pairs
 from navapp.registration.step_kernels import (
     FREE_FRACTION,
@@ -15,7 +16,6 @@ from navapp.registration.step_kernels import (
     sum_plane_system,
     sum_size_terms,
 )
-from navapp.registration.thickness import sum_thickness
 from navapp.values import SizedPose
 
 # Chosen, as all that names no source.
@@ -76,10 +76,8 @@ def compute_information(
     """
     seen_mm, lever_mm = find_weighted_centre(pairs, n)
     sized_H, g = _sum_sized_system(pairs, n, seen_mm, lever_mm)
-    if thickness_rows_mm is not None:
-        sized_H -= _sum_explained(pairs, n, seen_mm, lever_mm, thickness_rows_mm, n_sharing_errors)
-    H: FloatArray = sized_H[:6, :6]
-    eigenvalues, vectors = np.linalg.eigh(H)
+    # What a thickness explains as well is less sure, and no less fixed by its shape.
+    eigenvalues, vectors = np.linalg.eigh(sized_H[:6, :6])
     is_free = _are_free(eigenvalues)
     # (rotation x lever, translation) of the points become (translation, rotation) of the pose.
     turned = np.zeros((6, 6))
@@ -87,6 +85,12 @@ def compute_information(
     free = (turned @ vectors[:, is_free]).T
     if eigenvalues[0] <= _SINGULAR_FRACTION * eigenvalues[-1]:
         return Information(np.diag([np.inf] * 6), free)
+    if thickness_rows_mm is not None:
+        rows = _find_sized_rows(pairs, n, seen_mm, lever_mm)
+        sized_H, _ = solve_out_thickness(
+            rows, pairs.weight[:n], thickness_rows_mm, n_sharing_errors
+        )
+    H: FloatArray = sized_H[:6, :6]
     arm_mm = pose.rotation @ (centre_mm - seen_mm)
     change = _pose_by_points(pose.rotation, lever_mm, arm_mm)
     of_pose, inverse = change[:6, :6], np.asarray(np.linalg.inv(H), dtype=np.float64)
@@ -137,23 +141,11 @@ def _sum_sized_system(
     return H, g
 
 
-def _sum_explained(
-    pairs: Pairs,
-    n: int,
-    centre_mm: FloatArray,
-    lever_mm: float,
-    thickness_rows_mm: FloatArray,
-    n_sharing_errors: float,
-) -> FloatArray:
-    """(7, 7) of the information of motion and growth: what the thickness explains as well."""
-    weight = pairs.weight[:n]
+def _find_sized_rows(pairs: Pairs, n: int, centre_mm: FloatArray, lever_mm: float) -> FloatArray:
+    """(n, 7) how residuals grow with the motion of the points, and fall with the model's growth."""
     offsets_mm = pairs.point[:n] - centre_mm
     outward = (offsets_mm * pairs.direction[:n]).sum(axis=1) / lever_mm
-    rows = np.column_stack([find_motion_rows(pairs, n, centre_mm, lever_mm), -outward])
-    mixed = rows.T @ (weight[:, None] * thickness_rows_mm)
-    own = sum_thickness(thickness_rows_mm, weight, n_sharing_errors)
-    explained: FloatArray = mixed @ np.linalg.solve(own, mixed.T)
-    return explained
+    return np.column_stack([find_motion_rows(pairs, n, centre_mm, lever_mm), -outward])
 
 
 def _are_free(eigenvalues: FloatArray) -> NDArray[np.bool_]:

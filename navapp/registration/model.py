@@ -14,8 +14,8 @@ from navapp.geometry.simplify import drawn, is_closed
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.geometry.vertex_neighbourhoods import compute_curvature, find_neighbours
 from navapp.geometry.zbuffer import RenderedView, render_rectified
+from navapp.registration.cartilage_fit import ThicknessField
 from navapp.registration.lookup_kernels import ModelArrays, VoxelGrid, fill_model_grid
-from navapp.registration.thickness import ThicknessField
 from navapp.values import BoneModel
 
 # All chosen: of the grid of nearest vertices, and of the smoothed normals.

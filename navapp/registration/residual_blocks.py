@@ -117,9 +117,12 @@ def join(
     Source: Gauss-Newton on the sum of squares, kernel weights as in `step_kernels.weigh`; variance
     components after Foerstner 1979; covariance of an estimator with other weights than its noise's.
     """
-    # What the surface's residuals show of the variance that they claim, at most all of it.
+    # What the surface's residuals show of the variance that they claim, at most all of it. Where
+    # thickness was fitted, most of the covariance is the plan's, of which they show nothing.
     ratio2 = max((estimate.rms_mm / estimate.expected_rms_mm) ** 2, _LEAST_SQUARED_RATIO)
     scale = min(float(noise_under_kernel_mm2(ratio2, 1.0, kernel_sigmas)), 1.0)
+    if estimate.thickness_ratio is not None:
+        scale = 1.0
     # Of one memory layout: for each there would be a compiled version.
     covariance = np.ascontiguousarray(estimate.covariance)
     surface = SurfaceBlock(np.zeros(6), covariance, scale, noise_variance_ratio)

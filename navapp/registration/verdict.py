@@ -118,8 +118,8 @@ class Evidence:
 
     @property
     def spread_ratio(self) -> float:
-        """Of measured differences; NaN where thickness, which they still hold, was fitted."""
-        return self.seen.spread_ratio if math.isnan(self.thickness_ratio) else math.nan
+        """Of the agreement; 0 where thickness, which the differences still hold, was fitted."""
+        return self.seen.spread_ratio if math.isnan(self.thickness_ratio) else 0.0
 
     @property
     def tolerance_excess_mm(self) -> float:
@@ -262,7 +262,7 @@ def decide(evidence: Evidence) -> Verdict:
         agreement.inlier_fraction,
         estimate.rms_mm,
         estimate.expected_rms_mm,
-        agreement.spread_ratio,
+        evidence.spread_ratio,
     )
 
 

@@ -62,24 +62,24 @@ def make_face(
     )
     of_pose = estimate.covariance_at(left_from_bone.apply(planned.point_mm) - centre_mm)
     covariance = by_fit @ fit.covariance @ by_fit.T + by_pose @ of_pose @ by_pose.T
-    covariance += np.diag(_common_sd(left_from_bone, bone, quality) ** 2)
+    covariance += np.diag(_common_sd(estimate, bone, quality) ** 2)
     return MeasuredFace(planned, value, covariance, seen_share)
 
 
-def _common_sd(
-    left_from_bone: RigidTransform, bone: BoneModel, quality: RigQuality | None
-) -> FloatArray:
+def _common_sd(estimate: PoseEstimate, bone: BoneModel, quality: RigQuality | None) -> FloatArray:
     """(3,) of tilts and offset: what the plan's surface and the rig add to any pose's error."""
-    sd_mm = find_common_sd_mm(left_from_bone, bone, quality)
+    sd_mm = find_common_sd_mm(estimate, bone, quality)
     return np.array([sd_mm / _LEVER_MM, sd_mm / _LEVER_MM, sd_mm])
 
 
-def find_common_sd_mm(
-    left_from_bone: RigidTransform, bone: BoneModel, quality: RigQuality | None
-) -> float:
-    """By how much the plan's surface, its cartilage and the rig may be off at a bone."""
-    depth_mm = float(left_from_bone.apply(bone.mesh.centroid_mm[None])[0, 2])
-    cartilage_mm = float(np.sqrt(np.mean(bone.cartilage_sd_mm**2)))
+def find_common_sd_mm(estimate: PoseEstimate, bone: BoneModel, quality: RigQuality | None) -> float:
+    """By how much the plan's surface, its cartilage and the rig may be off at a bone.
+
+    A cartilage whose thickness was fitted is in the covariance of the pose.
+    """
+    depth_mm = float(estimate.camera_from_bone.apply(bone.mesh.centroid_mm[None])[0, 2])
+    is_known = estimate.thickness_ratio is not None
+    cartilage_mm = 0.0 if is_known else float(np.sqrt(np.mean(bone.cartilage_sd_mm**2)))
     # Told as a 95 % bound.
     rig_mm = 0.0 if quality is None else 0.5 * quality.error_mm(depth_mm)
     return float(np.sqrt(cartilage_mm**2 + bone.surface_sd_mm**2 + rig_mm**2))

@@ -77,7 +77,7 @@ class HoleMeter:
         pose, bone = estimate.camera_from_bone, self._bone
         by_pose = estimate.predict_covariances(bone.mesh.centroid_mm, entry_mm[None])[0]
         across = planned.axes @ pose.rotation.T
-        common_mm = find_common_sd_mm(pose, bone, self._rig.quality)
+        common_mm = find_common_sd_mm(estimate, bone, self._rig.quality)
         covariance = _COMMON_SD_MM**2 * np.diag([1.0, 1.0, 4.0])
         covariance[:2, :2] += across @ by_pose @ across.T + common_mm**2 * np.eye(2)
         return covariance

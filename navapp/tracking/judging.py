@@ -36,9 +36,9 @@ from navapp.values import (
     Verdict,
 )
 
-# All chosen. Errors of a cartilage's thickness are correlated over much of a bone. Points do not
-# average them out: the pose may be off by so many of their standard deviations
-# (docs/measurements.md).
+# All chosen. Errors of the plan's surface, and of a cartilage whose thickness was not fitted, are
+# correlated over much of a bone. Points do not average them out: the pose may be off by so many of
+# their standard deviations.
 _COMMON_ERROR_SIGMAS = 2.0
 _SURE_SIGMAS = 3.0
 # A model that the outline moved by no more looks as it was matched; a follower allows as much.
@@ -238,7 +238,7 @@ class PoseJudge:
         size_excess_mm = math.nan
         if (sized := estimate.sized) is not None:
             # Errors of a cartilage's thickness that go together look like another size.
-            size_sigma_mm = math.hypot(sized.growth_sigma_mm, plan_mm)
+            size_sigma_mm = math.hypot(sized.growth_sigma_mm, unseen_mm)
             size_limit_mm = max(OK_ERROR_MM, _SURE_SIGMAS * size_sigma_mm)
             size_excess_mm = abs(sized.growth_mm) - size_limit_mm
         twist = np.zeros(6)

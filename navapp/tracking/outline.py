@@ -90,7 +90,9 @@ class OutlineMeter:
             # Of a flank that one eye hardly sees neither model nor coarse map know anything there.
             is_free = ~(coarse_px > nearest_px)
             found = replace(found, origin=np.where(is_free, Origin.MATCHED, found.origin))
-        block = self.block(pair, fit.pose, view, found, coarse_px)
+        # Where thickness is unknown, the points of an outline share one error.
+        is_bare_only = estimate.thickness_ratio is not None
+        block = self.block(pair, fit.pose, view, found, coarse_px, is_bare_only=is_bare_only)
         centre_mm = fit.pose.apply(self._model.centre_mm)
         seen_mm = fit.measured.cloud.points_mm
         joined = join(
@@ -105,6 +107,8 @@ class OutlineMeter:
         view: RenderedView,
         measured: DisparityMap,
         coarse_px: NDArray[np.float32] | None = None,
+        *,
+        is_bare_only: bool = False,
     ) -> ResidualBlock:
         """Residuals of the outline in both pictures.
 
@@ -114,6 +118,7 @@ class OutlineMeter:
             view: the model at that pose, or next to it.
             measured: on the model, in the view's box.
             coarse_px: (h, w) coarse disparity of whatever lies in that box.
+            is_bare_only: without the outline of cartilage whose thickness is not known.
         """
 
         def find_edges(
@@ -124,6 +129,8 @@ class OutlineMeter:
             is_found = np.isfinite(offset_px)
             rim, offset_px = select_points(rim, is_found), offset_px[is_found]
             is_free = self._is_free(rim, view.box, measured, coarse_px)
+            if is_bare_only:
+                is_free &= self._model.bone.cartilage_sd_mm[rim.vertex] == 0.0
             return offset_px[is_free], *self._linearise(select_points(rim, is_free), eye, pose)
 
         both = run_both(
@@ -191,7 +198,6 @@ class OutlineMeter:
         inner = pixel[:, None] - _INSIDE_PX[:, None] * rim.normal[:, None]
         is_measured = look_up(measured.origin, inner, box, 0) == Origin.MATCHED
         is_free: NDArray[np.bool_] = is_measured.mean(axis=1) >= _LEAST_INSIDE
-        is_free &= self._model.bone.cartilage_sd_mm[rim.vertex] == 0.0
         if coarse_px is not None:
             beside_px = look_up(coarse_px, pixel + _BESIDE_PX * rim.normal, box, np.nan)
             rim_px = self._geometry.disparity_map_px(rim.point[:, 2])

@@ -65,6 +65,7 @@ class Row:
     coverage: float
     inlier_fraction: float
     thirds_mm: float
+    thickness_ratio: float
     free_rms_ratio: float
     free_coverage: float
     free_inlier_share: float
@@ -176,6 +177,7 @@ def _row(known: Patient, number: int, tracked: TrackedFrame, tracker: BimccTrack
         verdict.coverage,
         verdict.inlier_fraction,
         thirds_mm(tracker, frame, pose),
+        tracked.estimate.thickness_ratio or float("nan"),
         _ratio(free.rms_mm, free.expected_rms_mm),
         free.coverage,
         free.inlier_fraction,
@@ -183,7 +185,7 @@ def _row(known: Patient, number: int, tracked: TrackedFrame, tracker: BimccTrack
 
 
 def _lost(seed: int, number: int, reasons: str) -> Row:
-    return Row(seed, number, Status.LOST, reasons, *[float("nan")] * 9)
+    return Row(seed, number, Status.LOST, reasons, *[float("nan")] * 10)
 
 
 def _ratio(rms_mm: float | None, expected_mm: float | None) -> float:
@@ -259,8 +261,9 @@ def print_separation(rows: dict[str, list[Row]]) -> None:
     """Least, median and largest value of what a judge can look at."""
     keys = {
         "rms / expected": "rms_ratio", "coverage": "coverage", "inlier share": "inlier_fraction",
-        "thirds, mm": "thirds_mm", "free: rms / expected": "free_rms_ratio",
-        "free: coverage": "free_coverage", "free: inlier share": "free_inlier_share",
+        "thirds, mm": "thirds_mm", "thickness / deviation": "thickness_ratio",
+        "free: rms / expected": "free_rms_ratio", "free: coverage": "free_coverage",
+        "free: inlier share": "free_inlier_share",
     }  # fmt: skip
     print("\n| plan | " + " | ".join(keys) + " |")
     print("|---|" + "---|" * len(keys))

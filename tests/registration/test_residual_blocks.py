@@ -170,6 +170,17 @@ def test_less_noise_than_claimed_moves_the_pose_but_makes_no_claim() -> None:
     assert np.trace(exact.covariance) > 0.9 * np.trace(claimed.covariance)
 
 
+def test_residuals_say_nothing_of_what_the_plan_adds_to_a_covariance() -> None:
+    """Where a thickness was fitted, small residuals do not make the surface count for more."""
+    modest = replace(SURFACE, rms_mm=0.2 * SURFACE.expected_rms_mm)
+    claimed, quiet, fitted = (
+        join(one, WIDE, block_of(drawn(4)), CENTRE_MM, SEEN_MM)
+        for one in (SURFACE, modest, replace(modest, thickness_ratio=0.5))
+    )
+    np.testing.assert_allclose(moved_by(fitted), moved_by(replace(claimed)), rtol=0.2)
+    assert np.linalg.norm(moved_by(quiet)) < 0.8 * np.linalg.norm(moved_by(fitted))
+
+
 def test_too_much_of_something_else_is_told() -> None:
     """A model of another size: where its outline is near, it agrees."""
     block = block_of(drawn(3))

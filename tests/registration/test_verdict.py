@@ -263,7 +263,9 @@ def test_what_the_plan_costs_is_not_held_against_the_view() -> None:
 def test_what_a_fitted_thickness_explains_is_no_spread() -> None:
     wide = seen(spread_ratio=1.2)
     assert told(wide) == (Status.DEGRADED, (Reason.SURFACE_MISFIT,))
-    assert told(replace(wide, estimate=replace(ESTIMATE, thickness_ratio=0.8)))[1] == ()
+    fitted = decide(replace(wide, estimate=replace(ESTIMATE, thickness_ratio=0.8)))
+    assert fitted.reasons == ()
+    assert not is_worth_a_second_look(fitted)
 
 
 @pytest.mark.parametrize(

@@ -152,3 +152,7 @@ def test_errors_that_the_plan_and_the_rig_share_are_in_the_bound(meter: FaceMete
         assert plain is not None
         assert face.bound_mm == pytest.approx(np.hypot(plain.bound_mm, 1.96 * 0.1), rel=0.02)
         assert face.bound_deg > 1.5 * plain.bound_deg
+    left, right, told, *others = taken
+    fitted = replace(told, thickness_ratio=0.5)  # its covariance has the cartilage in it
+    face = FaceMeter(rig(), covered).measure(left, right, fitted, *others)
+    assert face.bound_mm == pytest.approx(plain.bound_mm)

@@ -1,6 +1,7 @@
 """What is said of poses of which the truth is known."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from navapp.registration import RegistrationModel, fit_bimcc, solution_at
 from navapp.registration.verdict import OK_ERROR_MM
 from navapp.tracking import Goal, TrackerSettings
 from navapp.tracking.agreement import compare
-from navapp.tracking.frame import FREE_SETTINGS
+from navapp.tracking.frame import FREE_SETTINGS, NOISE_VARIANCE_RATIO, Fit
 from navapp.tracking.judging import PoseJudge
 from navapp.values import (
     BoneModel,
@@ -209,8 +210,7 @@ def test_what_the_plans_surface_may_be_off_is_in_the_bound() -> None:
     assert known == pytest.approx(np.hypot(plain, 2.0 * 0.2))
 
 
-def test_a_thickness_that_was_fitted_is_in_the_covariance_and_is_no_noise() -> None:
-    """The plan's deviation is not added once more, and no part of the covariance is left out."""
+def test_a_thickness_that_was_fitted_is_in_the_covariance_and_is_not_added_again() -> None:
     sd_mm = np.full(len(BONE.mesh.vertices_mm), 0.35)
     model = RegistrationModel(replace(BONE, cartilage_sd_mm=sd_mm))
     estimate = replace(estimate_on(model=model), thickness_ratio=0.5)
@@ -222,11 +222,22 @@ def test_a_thickness_that_was_fitted_is_in_the_covariance_and_is_no_noise() -> N
     assert np.sqrt(bounds_mm[1] ** 2 - bounds_mm[0] ** 2) == pytest.approx(2.0 * 0.35, rel=0.02)
 
 
-def judged_with_size(size_mm: float, sigma_mm: float, model=MODEL) -> Verdict:
+@pytest.mark.parametrize("thickness_ratio", [None, 0.5])
+def test_of_a_covariance_with_the_plans_part_nothing_is_left_out(thickness_ratio) -> None:
+    judge = PoseJudge(meter_of(MODEL, None), TrackerSettings())
+    fit = Fit(replace(estimate_on(), thickness_ratio=thickness_ratio), None)
+    for lies_open in (False, True):
+        agreement = SimpleNamespace(lies_open=lies_open)
+        is_noise = lies_open and thickness_ratio is None
+        expected = NOISE_VARIANCE_RATIO if is_noise else 1.0
+        assert judge._noise_variance_ratio(fit, agreement) == expected
+
+
+def judged_with_size(size_mm: float, sigma_mm: float, model=MODEL, thickness_ratio=None) -> Verdict:
     step = np.append(np.zeros(6), size_mm)
     covariance = np.diag([*[1e-4] * 6, sigma_mm**2])
     sized = SizedPose(step, covariance, np.zeros(3), lever_mm=20.0)
-    estimate = replace(estimate_on(model=model), sized=sized)
+    estimate = replace(estimate_on(model=model), sized=sized, thickness_ratio=thickness_ratio)
     return judged(estimate, model=model).verdict
 
 
@@ -248,9 +259,11 @@ def test_a_bone_of_which_no_size_is_seen_is_not_doubted_for_it() -> None:
 
 
 def test_cartilage_that_the_plan_knows_roughly_may_look_like_another_size() -> None:
+    """Where its thickness was fitted, the size's own deviation knows of it."""
     sd_mm = np.full(len(BONE.mesh.vertices_mm), 0.35)
     model = RegistrationModel(replace(BONE, cartilage_sd_mm=sd_mm))
     assert Reason.SIZE_DIFFERS not in judged_with_size(1.0, 0.1, model).reasons
+    assert Reason.SIZE_DIFFERS in judged_with_size(1.0, 0.1, model, thickness_ratio=0.5).reasons
 
 
 def test_the_right_bone_has_the_right_size_and_a_larger_one_has_not() -> None:

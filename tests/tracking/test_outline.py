@@ -169,7 +169,9 @@ def test_an_outline_of_cartilage_whose_thickness_is_not_known_tells_nothing() ->
     bone = replace(femur(), cartilage_sd_mm=sd_mm)
     unsure = OutlineMeter(type(femur_for_registration())(bone), GEOMETRY)
     fit = fit_at(TRUE)
-    found = unsure.block(pair(), TRUE, fit.measured.rendered, fit.measured.disparity)
+    found = unsure.block(
+        pair(), TRUE, fit.measured.rendered, fit.measured.disparity, is_bare_only=True
+    )
     block = block_at(fit)
     assert 0 < len(found.residual) < len(block.residual)
     bare = (block.arm_mm @ TRUE.rotation + femur().mesh.centroid_mm)[:, 0] <= 0.0

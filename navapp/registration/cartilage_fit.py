@@ -6,6 +6,7 @@ of a normal prior (docs/how/registration.md).
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +15,10 @@ from scipy.spatial.distance import cdist
 from navapp.geometry.transform import FloatArray
 from navapp.registration.pairing_kernels import Pairs, Pose
 from navapp.registration.step_kernels import (
+    FREE_FRACTION,
     apply_twist,
     find_motion_rows,
     find_weighted_centre,
-    solve_step,
     weigh,
 )
 
@@ -28,6 +29,15 @@ _CORRELATION_MM, _COMMON_SHARE = 15.0, 0.3
 _ANCHOR_SPACING = 1.0
 # An anchor counts where it adds so much of the deviation somewhere.
 _LEAST_SHARE = 0.02
+_LEAST_MM2 = 1e-12
+
+
+class KernelWidth(NamedTuple):
+    """How wide the kernel of a step is."""
+
+    narrowest_mm: float
+    n_sigmas: float  # of a pair's own noise
+    counts_thickness: bool  # as noise, to reach what the thickness explains
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,7 +75,8 @@ class ThicknessField:
     def find_seen(self, vertices: NDArray[np.int32]) -> NDArray[np.intp]:
         """(k,) those unknowns that the thickness at vertices (n,) depends on."""
         largest_mm = np.abs(self.basis_mm[vertices]).max(axis=0, initial=0.0)
-        return np.flatnonzero(largest_mm > _LEAST_SHARE * np.sqrt(self.variance_mm2.max()))
+        seen_mm = math.sqrt(self.variance_mm2[vertices].max(initial=0.0))
+        return np.flatnonzero(largest_mm > _LEAST_SHARE * seen_mm)
 
 
 class ThicknessFit:
@@ -73,84 +84,99 @@ class ThicknessFit:
 
     Attributes:
         rows_mm: (n, k) by how much the residuals of the last pairs fall with the unknowns.
-        unknowns: (k,) standard normal before anything is seen.
+        unknowns: (k,) standard normal before anything is seen; none where no cartilage is seen.
     """
 
     def __init__(self, field: ThicknessField, pairs: Pairs, n: int) -> None:
-        self._field = field
-        self._basis_mm = field.basis_mm[:, field.find_seen(pairs.vertex[:n])]
-        n_unknowns = self._basis_mm.shape[1]
-        self.unknowns: FloatArray = np.zeros(n_unknowns)
-        self.rows_mm: FloatArray = np.zeros((0, n_unknowns))
+        self._field, self._columns = field, field.find_seen(pairs.vertex[:n])
+        self.unknowns: FloatArray = np.zeros(len(self._columns))
+        self.rows_mm: FloatArray = np.zeros((0, len(self._columns)))
         self._claimed_mm2: FloatArray = np.zeros(0)  # (n,) variance of the thickness
 
-    def take_out(self, pairs: Pairs, n: int) -> FloatArray:
-        """Take what the thickness explains out of measured pairs; in place.
-
-        Returns:
-            (n,) the residuals as they were.
-        """
-        vertices = pairs.vertex[:n]
-        self.rows_mm = self._basis_mm[vertices]
-        self._claimed_mm2 = self._field.variance_mm2[vertices]
-        residual_mm = pairs.residual[:n].copy()
-        pairs.residual[:n] -= self.rows_mm @ self.unknowns
-        pairs.variance[:n] -= self._claimed_mm2
-        return residual_mm
-
-    def weigh(
-        self, pairs: Pairs, n: int, sigma_mm: float, n_sigmas: float, *, is_wide: bool
-    ) -> None:
-        """As `step_kernels.weigh`; a wide kernel counts the deviation of the thickness as noise."""
-        narrow_mm2 = pairs.variance[:n].copy()
-        if is_wide:
-            pairs.variance[:n] += self._claimed_mm2
-        weigh(pairs, n, sigma_mm, n_sigmas, 0.0)
-        pairs.weight[:n] *= pairs.variance[:n] / narrow_mm2
-        pairs.variance[:n] = narrow_mm2
-
     def step(
-        self, pairs: Pairs, n: int, residual_mm: FloatArray, n_sharing_errors: float, pose: Pose
+        self, pairs: Pairs, n: int, kernel: KernelWidth, n_sharing_errors: float, pose: Pose
     ) -> tuple[float, float]:
-        """Move pose and thickness by one step of the weighted pairs; the pose in place.
+        """Move pose and thickness by one step; the pose in place.
+
+        The thickness so far is taken out of residuals and variances of the pairs, and they are
+        weighted; in place.
 
         Args:
-            pairs: weighted.
+            pairs: measured at the pose.
             n: so many.
-            residual_mm: (n,) with what the thickness explains.
+            kernel: of the weights.
             n_sharing_errors: so many neighbouring pairs have their errors in common.
-            pose: that they were measured at.
+            pose: that moves.
 
         Returns:
             Angle (rad) and length (mm) of the step.
         """
+        residual_mm = pairs.residual[:n].copy()
+        self._take_out(pairs, n)
+        self._weigh(pairs, n, kernel)
         centre, lever_mm = find_weighted_centre(pairs, n)
-        rows, weight = find_motion_rows(pairs, n, centre, lever_mm), pairs.weight[:n]
-        weighted = weight[:, None] * rows
-        by_both = -weighted.T @ self.rows_mm
-        by_thickness = sum_thickness(self.rows_mm, weight, n_sharing_errors)
-        pull, thickness_pull = weighted.T @ residual_mm, -self.rows_mm.T @ (weight * residual_mm)
-        # The thickness that is best for each pose is put into the pose's equations.
-        solved = np.linalg.solve(by_thickness, np.column_stack([by_both.T, thickness_pull]))
-        information = weighted.T @ rows - by_both @ solved[:, :6]
-        twist = solve_step(information, pull - by_both @ solved[:, 6], lever_mm)
-        motion = np.concatenate([twist[:3] * lever_mm, twist[3:]])
-        self.unknowns = -solved[:, 6] - solved[:, :6] @ motion
+        rows = np.column_stack([find_motion_rows(pairs, n, centre, lever_mm), residual_mm])
+        weight = pairs.weight[:n]
+        reduced, by_thickness = solve_out_thickness(rows, weight, self.rows_mm, n_sharing_errors)
+        fixed = _find_fixed(rows[:, :6], weight)
+        motion = -fixed @ np.linalg.solve(
+            fixed.T @ reduced[:6, :6] @ fixed, fixed.T @ reduced[:6, 6]
+        )
+        self.unknowns = by_thickness @ np.append(motion, 1.0)
+        twist = np.concatenate([motion[:3] / lever_mm, motion[3:]])
         apply_twist(twist, centre, pose)
         return float(np.linalg.norm(twist[:3])), float(np.linalg.norm(twist[3:]))
+
+    def _take_out(self, pairs: Pairs, n: int) -> None:
+        """Residuals without what the thickness explains, variances without the plan's; in place."""
+        vertices = pairs.vertex[:n]
+        self.rows_mm = self._field.basis_mm[np.ix_(vertices, self._columns)]
+        self._claimed_mm2 = self._field.variance_mm2[vertices]
+        pairs.residual[:n] -= self.rows_mm @ self.unknowns
+        pairs.variance[:n] -= self._claimed_mm2
+
+    def _weigh(self, pairs: Pairs, n: int, kernel: KernelWidth) -> None:
+        """As `step_kernels.weigh`; a wide kernel counts the deviation of the thickness as noise."""
+        narrow_mm2 = pairs.variance[:n].copy()
+        if kernel.counts_thickness:
+            pairs.variance[:n] += self._claimed_mm2
+        weigh(pairs, n, kernel.narrowest_mm, kernel.n_sigmas, 0.0)
+        pairs.weight[:n] *= pairs.variance[:n] / narrow_mm2
+        pairs.variance[:n] = narrow_mm2
 
     def find_ratio(self, weight: FloatArray) -> float:
         """Rms over weighted pairs (n,) of what was fitted, over the deviation that is claimed."""
         fitted_mm2 = float(weight @ (self.rows_mm @ self.unknowns) ** 2)
-        claimed_mm2 = float(weight @ self._claimed_mm2)
-        return math.sqrt(fitted_mm2 / claimed_mm2) if claimed_mm2 > 0.0 else 0.0
+        return math.sqrt(fitted_mm2 / max(float(weight @ self._claimed_mm2), _LEAST_MM2))
 
 
-def sum_thickness(rows_mm: FloatArray, weight: FloatArray, n_sharing_errors: float) -> FloatArray:
-    """(k, k) information of the thickness: of weighted pairs (n, k), and what is known before."""
-    information: FloatArray = rows_mm.T @ (weight[:, None] * rows_mm)
-    information[np.diag_indices_from(information)] += n_sharing_errors
-    return information
+def _find_fixed(rows: FloatArray, weight: FloatArray) -> FloatArray:
+    """(6, j) directions of a motion that the shape fixes, as `solve_step` judges them."""
+    values, vectors = np.linalg.eigh(rows.T @ (weight[:, None] * rows))
+    return np.asarray(vectors[:, values > FREE_FRACTION * values[-1]])
+
+
+def solve_out_thickness(
+    rows: FloatArray, weight: FloatArray, thickness_rows_mm: FloatArray, n_sharing_errors: float
+) -> tuple[FloatArray, FloatArray]:
+    """Normal equations of other unknowns, with the thickness that is best for each of them.
+
+    Args:
+        rows: (n, j) how residuals grow with the other unknowns; the residuals may be a column.
+        weight: (n,) of the residuals.
+        thickness_rows_mm: (n, k) how they fall with the unknowns of the thickness.
+        n_sharing_errors: so many neighbouring residuals have their errors in common.
+
+    Returns:
+        (j, j) of the rows, and (k, j) the best thickness by the other unknowns.
+    """
+    weighted = weight[:, None] * rows
+    mixed = thickness_rows_mm.T @ weighted
+    # Before anything is seen each is known to be N(0, 1).
+    own = thickness_rows_mm.T @ (weight[:, None] * thickness_rows_mm)
+    own[np.diag_indices_from(own)] += n_sharing_errors
+    by_thickness = np.asarray(np.linalg.solve(own, mixed), dtype=np.float64)
+    return weighted.T @ rows - mixed.T @ by_thickness, by_thickness
 
 
 def _spread_anchors(places_mm: FloatArray) -> FloatArray:
