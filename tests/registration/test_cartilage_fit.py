@@ -65,6 +65,7 @@ def drawn_field(n_vertices: int, n_unknowns: int = 5) -> ThicknessField:
     return ThicknessField(basis_mm, (basis_mm**2).sum(axis=1))
 
 
+@pytest.mark.kernel
 @pytest.mark.parametrize("counts_thickness", [False, True])
 def test_a_step_is_that_of_one_large_least_squares(counts_thickness: bool) -> None:
     """Residuals r + J m - B t in their weights, and t itself, brought down at once.

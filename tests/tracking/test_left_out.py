@@ -94,7 +94,7 @@ def test_without_an_outline_a_fit_is_as_with_one_of_which_nothing_is_found(monke
     nothing = ResidualBlock(
         np.empty((0, 6)), np.empty(0), np.empty(0), np.empty(0), 0.3, np.empty((0, 3))
     )
-    monkeypatch.setattr(outline, "block", lambda *_: nothing)
+    monkeypatch.setattr(outline, "block", lambda *_, **__: nothing)
     for noise in (1.0, 0.4):
         expected = outline.join(frame.pair, fit, None, noise).estimate
         found = fit.estimate.scale_noise(noise)

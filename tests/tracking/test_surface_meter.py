@@ -57,14 +57,14 @@ def test_where_too_little_would_be_left_all_of_it_is_trusted() -> None:
     np.testing.assert_array_equal(remove_gap_rims(found, EVERYWHERE).origin, found.origin)
 
 
-def test_what_is_measured_on_the_model_tells_the_size_of_the_bone() -> None:
+def test_what_is_measured_on_the_model_tells_the_shape_of_the_bone() -> None:
     meter = SurfaceMeter(cuts.rig(), RegistrationModel(cuts.bone()), (200.0, 900.0))
     pose = meter.geometry.rectified_from_left @ cuts.pose()
     pair = meter.rectify(*cuts.pictures(cuts.pose()), pose, NEAR_VIEW)
     expected = meter.render(pair, pose, NEAR_BOX)
     assert expected is not None
-    assert meter.measure_on_model(expected).scene.tells_size
-    assert not meter.measure_freely(pair, pose, NEAR_BOX).scene.tells_size
+    assert meter.measure_on_model(expected).scene.tells_shape
+    assert not meter.measure_freely(pair, pose, NEAR_BOX).scene.tells_shape
 
 
 def test_what_an_outline_is_mixed_with_does_not_pull_what_is_measured() -> None:
