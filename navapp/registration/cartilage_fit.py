@@ -29,6 +29,7 @@ _CORRELATION_MM, _COMMON_SHARE = 15.0, 0.3
 _ANCHOR_SPACING = 1.0
 # An anchor counts where it adds so much of the deviation somewhere.
 _LEAST_SHARE = 0.02
+# Keeps a ratio finite where no pair has a weight.
 _LEAST_MM2 = 1e-12
 
 

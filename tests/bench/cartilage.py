@@ -164,7 +164,7 @@ def _row(known: Patient, number: int, tracked: TrackedFrame, tracker: BimccTrack
     if pose is None:
         return _lost(known.seed, number, reasons)
     frame = known.frames[number]
-    free = tracker.assess(frame, pose, GOAL).verdict
+    free, ratio = tracker.assess(frame, pose, GOAL).verdict, tracked.estimate.thickness_ratio
     bone = BoneModel("femur", known.mesh, known.side)
     return Row(
         known.seed,
@@ -177,7 +177,7 @@ def _row(known: Patient, number: int, tracked: TrackedFrame, tracker: BimccTrack
         verdict.coverage,
         verdict.inlier_fraction,
         thirds_mm(tracker, frame, pose),
-        tracked.estimate.thickness_ratio or float("nan"),
+        float("nan") if ratio is None else ratio,
         _ratio(free.rms_mm, free.expected_rms_mm),
         free.coverage,
         free.inlier_fraction,

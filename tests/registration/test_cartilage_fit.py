@@ -142,13 +142,14 @@ def test_the_covariance_is_that_of_pose_and_thickness_together() -> None:
     pairs.weight[:n] = 4.0
     centre, lever_mm = find_weighted_centre(pairs, n)
     rows = find_motion_rows(pairs, n, centre, lever_mm)
-    # One of them looks like a shift.
+    # One of them looks like a shift, which it makes unsure and not free.
     rows_mm, sharing = np.random.default_rng(4).normal(0.0, 0.3, (n, 5)), 4.0
-    rows_mm[:, 0] += rows[:, 5]
+    rows_mm[:, 0] += 10.0 * rows[:, 5]
     found, plain = (
         compute_information(pairs, n, POSE, CENTRE, sharing, tells_size=True, thickness_rows_mm=one)
         for one in (rows_mm, None)
     )
+    assert not found.is_degenerate
     noise_mm2 = np.eye(n) * sharing / 4.0 + rows_mm @ rows_mm.T
     offsets_mm = (pairs.point[:n] - centre) / lever_mm
     sized_rows = np.column_stack([rows, -(offsets_mm * pairs.direction[:n]).sum(axis=1)])

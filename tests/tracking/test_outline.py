@@ -179,6 +179,23 @@ def test_an_outline_of_cartilage_whose_thickness_is_not_known_tells_nothing() ->
     assert found.variance.max() <= block.variance.max()
 
 
+@pytest.mark.parametrize("thickness_ratio", [None, 0.5])
+def test_the_outline_of_cartilage_is_left_out_where_its_thickness_was_fitted(
+    monkeypatch, thickness_ratio
+) -> None:
+    meter, fit, asked = OutlineMeter(femur_for_registration(), GEOMETRY), fit_at(TRUE), []
+    block = meter.block
+
+    def spy(*given, is_bare_only: bool):
+        asked.append(is_bare_only)
+        return block(*given, is_bare_only=is_bare_only)
+
+    monkeypatch.setattr(meter, "block", spy)
+    estimate = replace(fit.estimate, thickness_ratio=thickness_ratio)
+    meter.join(pair(), replace(fit, estimate=estimate), None)
+    assert asked == [thickness_ratio is not None]
+
+
 @pytest.mark.parametrize("eye", [0, 1])
 def test_each_picture_tells_something_of_its_own(eye: int) -> None:
     blank = np.zeros_like(pair().left)
