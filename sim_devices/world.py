@@ -322,9 +322,8 @@ class World:
         if body == "hand":
             offset = compute_sweep_offset_mm(self.scenario.instrument, time_s)
             height = self._scenes.scene(state).tissue_top_mm - _HAND_ABOVE_MM
-            return RigidTransform.from_parts(
-                "table", "hand", np.eye(3), offset + np.array([0.0, 0.0, height])
-            )
+            place = offset + self._middle_of_site_mm(state) + np.array([0.0, 0.0, height])
+            return RigidTransform.from_parts("table", "hand", np.eye(3), place)
         if body in ("drill", "chuck"):
             entry_mm, axis = self._site.made_hole
             tool = compute_drill_motion(entry_mm, axis, time_s, turns=body == "drill")
@@ -334,6 +333,14 @@ class World:
             subject=body,
             remedy=f"choose one of {', '.join(self.bodies)}",
         )
+
+    def _middle_of_site_mm(self, state: State) -> FloatArray:
+        """(3,) what a hand is held over: the middle of the knee, or of the patella beside it."""
+        if state.stage != "patella":
+            return np.zeros(3)
+        middle_mm = self.anatomy.bones["patella"].centroid_mm * self._sides
+        x_mm, y_mm, _ = (self._start @ self._site.femur_from_patella).apply(middle_mm)
+        return np.array([x_mm, y_mm, 0.0])
 
     def _place_in_view(self, table_from_body: RigidTransform) -> RigidTransform:
         """left_from_body of a pose that was made as for a right knee."""

@@ -110,6 +110,7 @@ def run_and_write(
     diagnostics.note(f"{n_tests} tests, {n_processes} at a time{alone}, into {options.out}")
     progress = CampaignProgress(n_tests, n_processes, diagnostics)
     run_campaign(folder, settings, n_processes, progress.tell)
+    folder.check_code()
     content = write(folder)
     write_json(str(folder.path / file_name), "evaluate", content)
     write_json(options.json, "evaluate", content)

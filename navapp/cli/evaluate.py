@@ -116,7 +116,7 @@ def _run_stress(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
 
 
 def _run_recording(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
-    from navapp.evaluation.paper.cases import METHODS
+    from navapp.evaluation.methods import METHODS
 
     of_knees = (
         "samples", "stages", "situations", "tests", "frames", "seed", "quick", "processes",
@@ -133,7 +133,8 @@ def _run_recording(options: argparse.Namespace, diagnostics: Diagnostics) -> int
 
 
 def _read_settings(options: argparse.Namespace) -> "TableSettings":
-    from navapp.evaluation.paper.cases import FIRST_SEED, METHODS, MOST_TESTS
+    from navapp.evaluation.methods import METHODS
+    from navapp.evaluation.paper.cases import FIRST_SEED, MOST_TESTS
     from navapp.evaluation.paper.settings import TableSettings
 
     usual = Counts(_TESTS, _FRAMES, FIRST_SEED)

@@ -8,7 +8,7 @@ from navapp.cli.diagnostics import Diagnostics
 from navapp.errors import UsageError
 
 if TYPE_CHECKING:
-    from navapp.evaluation.ablation.settings import AblationSettings
+    from navapp.evaluation.paper.settings import TableSettings
 
 _SAMPLES, _TESTS, _FRAMES, _QUICK_FRAMES = ["man"], 2, 40, 5
 
@@ -41,20 +41,19 @@ def run_ablation(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     return 0
 
 
-def _read_settings(options: argparse.Namespace) -> "AblationSettings":
-    from navapp.evaluation.ablation.settings import FIRST_ABLATION_SEED, AblationSettings
-    from navapp.evaluation.paper.cases import MOST_TESTS
+def _read_settings(options: argparse.Namespace) -> "TableSettings":
+    from navapp.evaluation.methods import VARIANTS
+    from navapp.evaluation.paper.cases import FIRST_ABLATION_SEED, MOST_TESTS
     from navapp.evaluation.paper.settings import TableSettings
 
     if options.methods is not None:
         raise UsageError("--methods is of the tables", remedy="leave it out, or --ablation")
     usual = Counts(_TESTS, _FRAMES, FIRST_ABLATION_SEED)
     counts = read_counts(options, usual, _QUICK_FRAMES, MOST_TESTS, "case")
-    cases = choose_cases(options, _SAMPLES)
-    knees = TableSettings(
-        cases, ("bimcc",), counts.tests, counts.frames, counts.first_seed, options.quick
+    cases, variants = choose_cases(options, _SAMPLES), tuple(VARIANTS)
+    return TableSettings(
+        cases, variants, counts.tests, counts.frames, counts.first_seed, options.quick
     )
-    return AblationSettings(knees)
 
 
 def _say(summary: dict[str, Any], out: str, diagnostics: Diagnostics) -> None:

@@ -4,21 +4,29 @@ import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
+from itertools import groupby
 from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar
 
+from pydantic import TypeAdapter
+
+from navapp.config import Configuration
 from navapp.environment import source_hash
 from navapp.errors import InputError, UsageError
-from navapp.evaluation.following import Answers
+from navapp.evaluation.following import follow
+from navapp.evaluation.methods import OURS, find_method
+from navapp.evaluation.provenance import list_libraries, name_processor
 from navapp.evaluation.scores import Followed
+from navapp.evaluation.scoring import score_answers
 from navapp.evaluation.sequence import KnownSequence
 from navapp.evaluation.workers import run_in_processes
 from navapp.evaluation.worst_frame import draw_worst_frame
 from navapp.geometry.whole_files import write_whole
 
 _SETTINGS, _TESTS, _TIMES, _PICTURES = "settings.json", "tests", "times", "pictures"
-# Setting that tells the code: results of two kinds of code do not belong into one table.
+# Settings that tell the code: results of two kinds of code do not belong into one table.
 _SOURCE = "source"
+_LIBRARIES = "libraries"
 
 
 class KnownTest(Protocol):
@@ -26,12 +34,16 @@ class KnownTest(Protocol):
 
     @property
     def name(self) -> str:
-        """For files."""
+        """Name of the test's result files."""
         ...
 
     @property
     def seed(self) -> int:
-        """Of the knee, its room and its pictures."""
+        """Random seed of the knee, its room and its pictures."""
+        ...
+
+    def configure(self) -> Configuration:
+        """The simulated camera: tests with the same one show the same pictures."""
         ...
 
 
@@ -43,16 +55,12 @@ class Campaign(Protocol[T]):
 
     @property
     def methods(self) -> tuple[str, ...]:
-        """Names of those that follow every test."""
-        ...
-
-    def count_frames(self, test: T) -> int:
-        """How many count, of a test."""
+        """Names of those that follow every test (`methods.find_method`)."""
         ...
 
     @property
     def tests(self) -> tuple[T, ...]:
-        """All of them."""
+        """All of them; those with the same pictures stand beside each other."""
         ...
 
     @property
@@ -60,24 +68,21 @@ class Campaign(Protocol[T]):
         """Those that are run once more, one after the other, for their times."""
         ...
 
-    def group(self, tests: Sequence[T]) -> list[tuple[T, ...]]:
-        """The tests in their order; those that share pictures are run in one process."""
+    @property
+    def has_details(self) -> bool:
+        """Whether our worst frames are drawn, and error budgets are measured: that takes time."""
         ...
 
-    def render(self, test: T, n_frames: int) -> KnownSequence:
-        """The pictures of a test: so many that count, after the one that is registered in."""
-        ...
-
-    def follow(self, sequence: KnownSequence, method: str) -> Answers:
-        """What a method of these says of a sequence."""
-        ...
-
-    def __hash__(self) -> int:
-        """The same campaign is warmed up for once."""
+    def render(self, test: T, n_frames: int | None = None) -> KnownSequence:
+        """The pictures of a test, or only so many frames after the one that is registered in."""
         ...
 
     def to_json(self) -> dict[str, Any]:
         """Named values; a folder is of one campaign only."""
+        ...
+
+    def __hash__(self) -> int:
+        """It does not change."""
         ...
 
 
@@ -87,6 +92,20 @@ class Done(Generic[T]):
 
     test: T
     followed: dict[str, Followed]
+    machine: str = ""  # that it was run on
+
+
+@dataclass(frozen=True, slots=True)
+class _TestFile:
+    """What is kept of a test."""
+
+    test: str
+    seed: int
+    machine: str
+    methods: dict[str, Followed]
+
+
+_TEST_FILE = TypeAdapter(_TestFile)
 
 
 class CampaignFolder(Generic[T]):
@@ -103,28 +122,48 @@ class CampaignFolder(Generic[T]):
 
     def __init__(self, folder: str | Path, settings: Campaign[T]) -> None:
         self.path, self._settings = Path(folder), settings
-        wanted = {_SOURCE: source_hash(), **settings.to_json()}
+        self._source = source_hash()
+        wanted = {
+            _SOURCE: self._source, _LIBRARIES: list_libraries(), **settings.to_json()
+        }  # fmt: skip
         kept = self.path / _SETTINGS
         if kept.is_file():
             _check_same(folder, _read_settings(kept), wanted)
-            return
-        is_folder = self.path.is_dir()
-        if self.path.exists() and (not is_folder or any(self.path.iterdir())):
+        elif self.path.exists() and not self.path.is_dir():
             raise UsageError(
-                f"{folder} holds something else" if is_folder else f"{folder} is no folder",
-                subject=str(folder),
+                f"{folder} is no folder", subject=str(folder),
                 remedy="choose a new folder for --out",
-            )
+            )  # fmt: skip
+        elif self.path.is_dir() and any(self.path.iterdir()):
+            raise UsageError(
+                f"{folder} holds something else", subject=str(folder),
+                remedy="choose a new folder for --out",
+            )  # fmt: skip
         try:
+            self.path.mkdir(parents=True, exist_ok=True)
+            # Also where they are kept already: better told now than after the first test.
+            write_whole(kept, (json.dumps(wanted, indent=1) + "\n").encode())
             for part in (_TESTS, _TIMES, _PICTURES):
-                (self.path / part).mkdir(parents=True, exist_ok=True)
+                (self.path / part).mkdir(exist_ok=True)
         except OSError as error:
             raise InputError(
-                f"folder {folder} cannot be made",
+                f"folder {folder} cannot be written",
                 subject=str(folder),
                 remedy="choose another place for --out",
             ) from error
-        write_whole(kept, (json.dumps(wanted, indent=1) + "\n").encode())
+
+    def check_code(self) -> None:
+        """Refuse what other code has made than the folder was begun with.
+
+        Raises:
+            UsageError: the code of navapp was changed while it ran.
+        """
+        if source_hash() != self._source:
+            raise UsageError(
+                "the code of navapp was changed during the run",
+                subject=str(self.path),
+                remedy="go on with the code that began it, or choose another --out",
+            )
 
     def file_of(self, test: T, *, is_timed: bool) -> Path:
         """Of a test's results."""
@@ -133,6 +172,28 @@ class CampaignFolder(Generic[T]):
     def picture_of(self, test: T) -> Path:
         """Of a test's worst frame."""
         return self.path / _PICTURES / f"{test.name}.jpg"
+
+    def write(self, done: Done[T], *, is_timed: bool, picture: bytes | None = None) -> None:
+        """Keep a test; its file appears when all of it is there.
+
+        Raises:
+            UsageError: the code of navapp was changed since the folder was opened.
+            InputError: it cannot be written.
+        """
+        self.check_code()
+        test = done.test
+        kept = _TestFile(test.name, test.seed, done.machine, done.followed)
+        path = self.file_of(test, is_timed=is_timed)
+        try:
+            if picture is not None:
+                write_whole(self.picture_of(test), picture)
+            write_whole(path, _TEST_FILE.dump_json(kept) + b"\n")
+        except OSError as error:
+            raise InputError(
+                f"{path} cannot be written ({error.strerror})",
+                subject=str(path),
+                remedy="make room or give access there, and run again",
+            ) from error
 
     def missing(self, tests: Sequence[T], *, is_timed: bool) -> list[T]:
         """Tests that are not done yet.
@@ -154,16 +215,13 @@ class CampaignFolder(Generic[T]):
             if not path.is_file():
                 continue
             try:
-                content = json.loads(path.read_text(encoding="utf-8"))
-                followed = {
-                    method: Followed.from_json(content["methods"][method])
-                    for method in self._settings.methods
-                }
-            except (ValueError, KeyError, TypeError) as error:
+                kept = _TEST_FILE.validate_json(path.read_bytes())
+                followed = {method: kept.methods[method] for method in self._settings.methods}
+            except (ValueError, KeyError) as error:
                 raise InputError(
                     f"{path} is damaged", subject=str(path), remedy="delete it, and run again"
                 ) from error
-            yield Done(test, followed)
+            yield Done(test, followed, kept.machine)
 
 
 def run_campaign(
@@ -189,7 +247,9 @@ def run_campaign(
     on_progress(n_done, total, "")
     for part, processes, is_timed in ((missing, n_processes, False), (slow, 1, True)):
         run = partial(run_tests, folder, settings, is_timed=is_timed)
-        for tests in run_in_processes(run, settings.group(part), processes):
+        # Levels of a rig or a plan are seen in the same pictures.
+        groups = [tuple(tests) for _, tests in groupby(part, key=lambda test: test.configure())]
+        for tests in run_in_processes(run, groups, processes):
             n_done += len(tests)
             on_progress(n_done, total, tests[-1].name)
 
@@ -203,44 +263,43 @@ def run_tests(
 
 
 def run_test(folder: CampaignFolder[T], settings: Campaign[T], test: T, *, is_timed: bool) -> None:
-    """Render a test and follow it with every method; the file appears when all is done."""
-    sequence = settings.render(test, settings.count_frames(test))
+    """Render a test, follow it with every method, and keep what came of it."""
+    sequence = settings.render(test)
     if is_timed:
         _warm_up(settings)
         # Its errors are those of the other pass: without truth none is measured again.
         sequence = replace(sequence, truth=[None] * len(sequence.truth))
-    answers = {method: settings.follow(sequence, method) for method in settings.methods}
-    if not is_timed and "bimcc" in answers:
-        picture = draw_worst_frame(sequence, answers["bimcc"])
-        if picture is not None:
-            write_whole(folder.picture_of(test), picture)
-    content = {
-        "test": test.name,
-        "seed": test.seed,
-        "methods": {method: one.followed.to_json() for method, one in answers.items()},
-    }
-    path = folder.file_of(test, is_timed=is_timed)
-    write_whole(path, (json.dumps(content, allow_nan=False) + "\n").encode())
+    answers = {name: follow(sequence, *find_method(name)) for name in settings.methods}
+    scored = {
+        name: score_answers(sequence, one, has_budget=settings.has_details and name == OURS)
+        for name, one in answers.items()
+    }  # fmt: skip
+    picture = None
+    if settings.has_details and OURS in answers and not is_timed:
+        picture = draw_worst_frame(sequence, answers[OURS], scored[OURS].frames)
+    folder.write(Done(test, scored, name_processor()), is_timed=is_timed, picture=picture)
 
 
 @cache
 def _warm_up(settings: Campaign[Any]) -> None:
     """Load what a process compiles or reads at its first frames: it belongs to no test's times."""
     sequence = settings.render(settings.tests[0], 2)
-    for method in settings.methods:
-        settings.follow(sequence, method)
+    for name in settings.methods:
+        follow(sequence, *find_method(name))
 
 
 def _check_same(folder: str | Path, kept: Any, wanted: Mapping[str, Any]) -> None:
     """Refuse to go on with another evaluation, or with other code."""
     if kept == wanted:
         return
-    if isinstance(kept, dict) and {**kept, _SOURCE: wanted[_SOURCE]} == wanted:
-        raise UsageError(
-            f"{folder} was begun with other code of navapp",
-            subject=str(folder),
-            remedy="go on with that code, or choose another --out",
-        )
+    begun_with = {} if not isinstance(kept, dict) else kept
+    for key, name in ((_SOURCE, "code of navapp"), (_LIBRARIES, "libraries")):
+        if {**begun_with, key: wanted[key]} == wanted:
+            raise UsageError(
+                f"{folder} was begun with other {name}",
+                subject=str(folder),
+                remedy="go on with these, or choose another --out",
+            )
     raise UsageError(
         f"{folder} holds another evaluation",
         subject=str(folder),

@@ -1,6 +1,5 @@
-"""One method on one sequence: registered once, then followed, and judged against the truth."""
+"""One method on one sequence: registered once, then followed."""
 
-import math
 import time
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -16,22 +15,15 @@ from navapp.control.runner import run_headless
 from navapp.control.specification import specify_session
 from navapp.control.states import SessionState, Snapshot
 from navapp.devices import make_memory_devices
-from navapp.devices.simulated_room import make_sensor
-from navapp.evaluation.noise_limit.frame import measure_budget
-from navapp.evaluation.pose_errors import measure_pose
-from navapp.evaluation.predicted_errors import predict_errors_mm
-from navapp.evaluation.scores import ErrorBudget, Followed, FrameScore
+from navapp.evaluation.methods import OURS
 from navapp.evaluation.sequence import KnownSequence
 from navapp.geometry.mesh import TriangleMesh
-from navapp.geometry.rectification import rectifier_of
 from navapp.geometry.transform import RigidTransform
 from navapp.tracking import Method, Part
-from navapp.values import Status, TrackedFrame, Verdict
+from navapp.values import PoseEstimate, Status, Verdict
 
 # A bone that so many searches have not found is not searched for any more.
 _MOST_REGISTRATIONS = 5
-# One frame of so many has its error budget measured, for time alone.
-_BUDGET_EVERY = 5
 
 
 class Follower:
@@ -43,8 +35,9 @@ class Follower:
     """
 
     def __init__(self, *, follows_refused: bool) -> None:
-        self._follows_refused = follows_refused
+        self.follows_refused = follows_refused
         self.n_registrations = 0
+        self.has_accepted = False
 
     def commands(self, snapshot: Snapshot) -> list[Command]:
         """What to do now."""
@@ -56,20 +49,45 @@ class Follower:
         if snapshot.state is not SessionState.REVIEW:
             return []
         status = Status.LOST if snapshot.verdict is None else snapshot.verdict.status
-        if status is Status.LOST and self._follows_refused:
+        if status is Status.LOST and self.follows_refused:
             return []
-        is_last = self._follows_refused or self.n_registrations == _MOST_REGISTRATIONS
+        is_last = self.follows_refused or self.n_registrations == _MOST_REGISTRATIONS
         is_enough = status is Status.OK or (is_last and status is not Status.LOST)
+        self.has_accepted |= is_enough
         return [(Accept if is_enough else Reject)(snapshot.candidate_id)]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrameAnswer:
+    """What a method said of one frame."""
+
+    pose: RigidTransform | None  # left camera from bone
+    estimate: PoseEstimate | None  # of that pose
+    verdict: Verdict | None  # None: the bone was not looked for
+    total_ms: float  # that the frame took, from rectification to overlay
+    is_search: bool  # a registration was made in it
+
+    @property
+    def is_ok(self) -> bool:
+        """The judge believes the pose."""
+        return self.verdict is not None and self.verdict.status is Status.OK
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Answers:
     """What a method said of a sequence."""
 
-    followed: Followed
-    poses: tuple[RigidTransform | None, ...]  # left camera from bone, of every frame
+    frames: tuple[FrameAnswer, ...]  # all of the sequence
+    # until the first registration whose pose was followed, with those that failed before; None:
+    # none was.
+    registration_s: float | None
+    n_registrations: int  # searches that were made
     surface: TriangleMesh  # of the bone, as it is drawn
+
+    @property
+    def poses(self) -> list[RigidTransform | None]:
+        """Left camera from bone, of every frame."""
+        return [frame.pose for frame in self.frames]
 
 
 def follow(
@@ -77,15 +95,14 @@ def follow(
 ) -> Answers:
     """Register the bone in the first frame, and follow it to the last one.
 
-    The paper's two methods carry on what our judge refuses, so that they can be measured; its word
-    on them is kept. Of ours, parts may be left out.
+    The truth is not read. The paper's two methods carry on what our judge refuses, so that they can
+    be measured; its word on them is kept. Of ours, parts may be left out.
 
     Raises:
         NavappError: the session ended in a fault: a picture that cannot be read.
     """
-    follows_refused = method != "bimcc"
-    operator = Follower(follows_refused=follows_refused)
-    judge = _Judge(sequence, operator, follows_refused=follows_refused)
+    follows_refused = method != OURS
+    operator, recorder = Follower(follows_refused=follows_refused), _Recorder()
     clock = ManualClock()
     specification = specify_session(
         sequence.configuration,
@@ -106,129 +123,53 @@ def follow(
             devices,
             specification,
             executor=InlineExecutor(),
-            hooks=SessionHooks(on_frame=(judge.take,)),
+            hooks=SessionHooks(on_frame=(lambda result: recorder.take(result, operator),)),
         )
         undo.callback(controller.close)
-        judge.surface = controller.snapshot.bone_surface or judge.surface
-        started_s = time.perf_counter()
+        surface = controller.snapshot.bone_surface or sequence.plan.bones[sequence.stage.bone].mesh
         run_headless(controller, operator)
         if controller.failure is not None:
             raise controller.failure
-    return judge.result(started_s)
+    return recorder.answer(operator, surface)
 
 
-class _Judge:
-    """Scores frames as they come; the sequence's truth goes no further."""
+class _Recorder:
+    """Notes what is said of frames as they come, and when."""
 
-    def __init__(
-        self, sequence: KnownSequence, operator: Follower, *, follows_refused: bool
-    ) -> None:
-        self._sequence, self._operator = sequence, operator
-        self._follows_refused = follows_refused
+    def __init__(self) -> None:
+        self._frames: list[FrameAnswer] = []
         self._n_searches = 0  # that were made before the newest frame
-        self._bone = sequence.plan.bones[sequence.stage.bone]
-        self._targets_mm = sequence.plan.targets_of(sequence.stage.targets)
-        self._rectifier = rectifier_of(sequence.rig)
-        self._geometry = self._rectifier.geometry
-        self._scores: list[FrameScore] = []
-        self._poses: list[RigidTransform | None] = []
-        self._registered_s: float | None = None
-        self._spent_s = 0.0  # in judging
-        self.surface: TriangleMesh = self._bone.mesh  # what is left of the bone
+        self._taken_s: list[float] = []  # when each frame was done
+        self._began_s = time.perf_counter()
 
-    def take(self, result: FrameResult) -> None:
+    def take(self, result: FrameResult, operator: Follower) -> None:
         """A frame was handled."""
-        started_s = time.perf_counter()
         tracked = result.tracked
-        pose = None if tracked is None else tracked.left_from_bone
-        is_lost = tracked is None or tracked.verdict.status is Status.LOST
-        is_kept = pose is not None and (self._follows_refused or not is_lost)
-        is_search = self._operator.n_registrations > self._n_searches
-        self._n_searches = self._operator.n_registrations
-        # A later search replaces one that was rejected.
-        if is_kept and (is_search or self._registered_s is None):
-            self._registered_s = started_s - self._spent_s
-        self._poses.append(pose)
-        self._scores.append(self._score(result, is_search=is_search))
-        self._spent_s += time.perf_counter() - started_s
-
-    def result(self, started_s: float) -> Answers:
-        """Scores of all frames but the one in which the first search was made."""
-        registered_s = self._registered_s
-        seconds = None if registered_s is None else registered_s - started_s
-        followed = Followed(seconds, self._n_searches, tuple(self._scores[1:]))
-        return Answers(followed, tuple(self._poses), self.surface)
-
-    def _score(self, result: FrameResult, *, is_search: bool) -> FrameScore:
-        place, tracked = len(self._scores), result.tracked
-        verdict = None if tracked is None else tracked.verdict
-        pose = None if tracked is None else tracked.left_from_bone
-        true = self._sequence.truth[place]
-        tre_mm, displacement_mm, outline_mm = self._measure(pose, true)
-        has_budget = verdict is not None and verdict.status is Status.OK
-        return FrameScore(
-            index=place,
-            status=Status.LOST.value if verdict is None else verdict.status.value,
-            reasons=() if verdict is None else tuple(one.value for one in verdict.reasons),
-            tre_mm=tre_mm,
-            displacement_mm=displacement_mm,
-            outline_mm=outline_mm,
-            bound_mm=None if verdict is None else verdict.predicted_tre_mm,
-            seen=None if verdict is None else verdict.coverage,
-            hidden=None if verdict is None else verdict.occluded_fraction,
-            total_ms=result.timings.total_ms,
-            is_search=is_search,
-            claimed_mm=self._predict(tracked),
-            rms_ratio=_find_rms_ratio(verdict),
-            budget=self._measure_budget(place, pose, true) if has_budget else None,
+        is_search = operator.n_registrations > self._n_searches
+        self._n_searches = operator.n_registrations
+        self._taken_s.append(time.perf_counter() - self._began_s)
+        self._frames.append(
+            FrameAnswer(
+                None if tracked is None else tracked.left_from_bone,
+                None if tracked is None else tracked.estimate,
+                None if tracked is None else tracked.verdict,
+                result.timings.total_ms,
+                is_search,
+            )
         )
 
-    def _predict(self, tracked: TrackedFrame | None) -> tuple[float, ...] | None:
-        if tracked is None or tracked.estimate is None:
-            return None
-        return predict_errors_mm(tracked.estimate, self._bone, self._targets_mm)
-
-    def _measure_budget(
-        self, place: int, pose: RigidTransform | None, true: RigidTransform | None
-    ) -> ErrorBudget | None:
-        """Of one frame of some, of our method, where the sensor is known."""
-        sequence, camera = self._sequence, self._sequence.configuration.camera
-        is_asked = place % _BUDGET_EVERY == 1 and not self._follows_refused
-        is_known = sequence.is_simulated and camera.backend == "simulated"
-        if not (is_asked and is_known) or pose is None or true is None:
-            return None
-        if len(self._targets_mm) == 0:
-            return None
-        return measure_budget(
-            sequence.frames[place],
-            pose,
-            true,
-            self.surface,
-            self._bone.mesh.centroid_mm,
-            self._targets_mm,
-            self._rectifier,
-            make_sensor(camera.simulated),
+    def answer(self, operator: Follower, surface: TriangleMesh) -> Answers:
+        """All of it."""
+        return Answers(
+            tuple(self._frames), self._find_start_s(operator), operator.n_registrations, surface
         )
 
-    def _measure(
-        self, pose: RigidTransform | None, true: RigidTransform | None
-    ) -> tuple[float | None, float | None, float | None]:
-        if pose is None or true is None:
-            return None, None, None
-        return measure_pose(
-            pose,
-            true,
-            self._bone,
-            self._targets_mm,
-            self.surface,
-            self._geometry,
-            self._sequence.true_targets_mm,
-        )
-
-
-def _find_rms_ratio(verdict: Verdict | None) -> float | None:
-    """Residual of the fit over the expected one."""
-    if verdict is None or verdict.rms_mm is None or not verdict.expected_rms_mm:
-        return None
-    ratio = verdict.rms_mm / verdict.expected_rms_mm
-    return ratio if math.isfinite(ratio) else None
+    def _find_start_s(self, operator: Follower) -> float | None:
+        """When the search was done whose pose was followed."""
+        if operator.follows_refused:
+            started = [place for place, one in enumerate(self._frames) if one.pose is not None][:1]
+        else:
+            # What was accepted is the last search; those before it were rejected.
+            searches = [place for place, one in enumerate(self._frames) if one.is_search]
+            started = searches[-1:] if operator.has_accepted else []
+        return self._taken_s[started[0]] if started else None

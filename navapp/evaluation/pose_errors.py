@@ -1,11 +1,23 @@
 """The errors of one estimated pose against the true one."""
 
+from dataclasses import dataclass
+
 from navapp.evaluation.overlay_error import measure_overlay_error
 from navapp.evaluation.truth import compute_mean_tre_mm
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.rectification import RectifiedGeometry
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.values import BoneModel
+
+
+@dataclass(frozen=True, slots=True)
+class PoseErrors:
+    """In mm; None is not known."""
+
+    tre_mm: float | None = None  # mean over the stage's targets (`compute_mean_tre_mm`)
+    # Of the drawn bone (`OverlayError`).
+    displacement_mm: float | None = None
+    outline_mm: float | None = None
 
 
 def measure_pose(
@@ -16,8 +28,8 @@ def measure_pose(
     surface: TriangleMesh,
     geometry: RectifiedGeometry,
     true_targets_mm: FloatArray | None = None,
-) -> tuple[float | None, float | None, float | None]:
-    """Target registration error, displacement and outline distance of the drawn bone, mm.
+) -> PoseErrors:
+    """Target registration error, displacement and outline distance of the drawn bone.
 
     Args:
         pose: estimated, left camera from bone.
@@ -31,5 +43,5 @@ def measure_pose(
     tre_mm = compute_mean_tre_mm(pose, true, bone, targets_mm, true_targets_mm)
     drawn = measure_overlay_error(pose, true, surface, geometry)
     if drawn is None:
-        return tre_mm, None, None
-    return tre_mm, drawn.displacement_mm, drawn.outline_mm
+        return PoseErrors(tre_mm)
+    return PoseErrors(tre_mm, drawn.displacement_mm, drawn.outline_mm)

@@ -20,11 +20,18 @@ def describe_origin() -> str:
     """One line: version, hash and commit of the code, versions of its libraries, the machine."""
     commit = find_commit(Path(__file__).resolve().parents[2])
     code = f"source {source_hash()}" + ("" if commit is None else f", commit {commit}")
-    return (
-        f"navapp {__version__}, {code}; Python {platform.python_version()}, "
-        f"numpy {np.__version__}, numba {version('numba')}, OpenCV {cv2.__version__}; "
-        f"{_name_processor()}, {os.cpu_count()} cores"
-    )
+    libraries = ", ".join(f"{name} {number}" for name, number in list_libraries().items())
+    return f"navapp {__version__}, {code}; {libraries}; {name_processor()}, {os.cpu_count()} cores"
+
+
+def list_libraries() -> dict[str, str]:
+    """Versions of what the figures depend on."""
+    return {
+        "Python": platform.python_version(),
+        "numpy": np.__version__,
+        "numba": version("numba"),
+        "OpenCV": cv2.__version__,
+    }
 
 
 def find_commit(folder: Path) -> str | None:
@@ -43,7 +50,9 @@ def find_commit(folder: Path) -> str | None:
     return told.stdout.strip() or None
 
 
-def _name_processor() -> str:
+@cache
+def name_processor() -> str:
+    """The computer's processor."""
     try:
         text = Path("/proc/cpuinfo").read_text(encoding="utf-8")
     except OSError:

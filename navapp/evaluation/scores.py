@@ -1,11 +1,11 @@
 """A frame that was judged against the truth, and its place in files."""
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
-from typing import Any
+from dataclasses import dataclass
 
 # Shares of errors that bounds are to hold for.
 LEVELS = (0.5, 0.8, 0.95, 0.99)
+# A pose that is called OK and further off than this, and than its bound, is wrong.
+WRONG_MM = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +47,22 @@ class FrameScore:
         return self.status == "OK"
 
     @property
+    def is_far(self) -> bool:
+        """Its error is known, and larger than `WRONG_MM`."""
+        return self.tre_mm is not None and self.tre_mm > WRONG_MM
+
+    @property
+    def is_within_bound(self) -> bool:
+        """Error and predicted bound are known, and the error is below the bound."""
+        known = self.tre_mm is not None and self.bound_mm is not None
+        return known and (self.tre_mm or 0.0) <= (self.bound_mm or 0.0)
+
+    @property
+    def is_wrong(self) -> bool:
+        """It is called OK, and is further off than `WRONG_MM` and than its bound."""
+        return self.is_ok and self.is_far and not self.is_within_bound
+
+    @property
     def was_followed(self) -> bool:
         """A registered bone was followed or looked for again in it, and judged; needs no truth.
 
@@ -54,58 +70,16 @@ class FrameScore:
         """
         return self.seen is not None and not self.is_search
 
-    def to_json(self) -> dict[str, Any]:
-        """Named values."""
-        return asdict(self)
-
-    @classmethod
-    def from_json(cls, content: Mapping[str, Any]) -> "FrameScore":
-        """Of such an object.
-
-        Raises:
-            KeyError, TypeError: it is none.
-        """
-        values = {one.name: content[one.name] for one in fields(cls)}
-        claimed, budget = values["claimed_mm"], values["budget"]
-        return cls(
-            **{
-                **values,
-                "reasons": tuple(values["reasons"]),
-                "claimed_mm": None if claimed is None else tuple(claimed),
-                "budget": None if budget is None else ErrorBudget(**budget),
-            }
-        )
-
 
 @dataclass(frozen=True, slots=True)
 class Followed:
     """What a method made of a sequence."""
 
-    # of the first registration whose pose was followed, with those that failed before; None: none.
+    # until the first registration whose pose was followed, with those that failed before; None:
+    # none was.
     registration_s: float | None
     n_registrations: int  # searches that were made
     frames: tuple[FrameScore, ...]  # after the frame of the first search
-
-    def to_json(self) -> dict[str, Any]:
-        """Named values."""
-        return {
-            "registration_s": self.registration_s,
-            "n_registrations": self.n_registrations,
-            "frames": [frame.to_json() for frame in self.frames],
-        }
-
-    @classmethod
-    def from_json(cls, content: Mapping[str, Any]) -> "Followed":
-        """Of such an object.
-
-        Raises:
-            KeyError, TypeError: it is none.
-        """
-        return cls(
-            content["registration_s"],
-            content["n_registrations"],
-            tuple(FrameScore.from_json(one) for one in content["frames"]),
-        )
 
     @property
     def times_ms(self) -> list[float]:

@@ -1,8 +1,11 @@
 """The frame of a test in which an accepted pose was worst, drawn with both outlines."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from navapp.evaluation.following import Answers
+from navapp.evaluation.scores import FrameScore
 from navapp.evaluation.sequence import KnownSequence
 from navapp.geometry.box import Box
 from navapp.geometry.zbuffer import render
@@ -12,12 +15,14 @@ _TRUE, _DRAWN = (255, 255, 255), (80, 220, 60)
 _MARGIN_PX, _WIDTH_PX, _QUALITY = 30, 420, 80
 
 
-def draw_worst_frame(sequence: KnownSequence, answers: Answers) -> bytes | None:
+def draw_worst_frame(
+    sequence: KnownSequence, answers: Answers, scores: Sequence[FrameScore]
+) -> bytes | None:
     """A JPEG around the bone: true outline white, the estimated one green; None without a frame.
 
     Of all frames that the judge calls OK the one with the largest error, else the first one.
     """
-    ok = [one for one in answers.followed.frames if one.is_ok and one.tre_mm is not None]
+    ok = [one for one in scores if one.is_ok and one.tre_mm is not None]
     index = max(ok, key=lambda one: one.tre_mm or 0.0).index if ok else 0
     return None if sequence.truth[index] is None else draw_frame(sequence, answers, index)
 

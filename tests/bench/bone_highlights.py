@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from navapp.control.stages import stage_by_name
 from navapp.evaluation.following import follow
+from navapp.evaluation.scoring import score_answers
 from navapp.evaluation.sequence import KnownSequence
 from navapp.registration import RegistrationModel
 from navapp.stereo import refine_on_model
@@ -98,7 +99,8 @@ def _spread(
 def _follow_all(sequences: list[KnownSequence], *, is_on: bool) -> str:
     patched = HighlightSearch.find if is_on else (lambda *_: iter(()))
     with mock.patch.object(HighlightSearch, "find", patched):
-        frames = [one for seq in sequences for one in follow(seq, "bimcc").followed.frames]
+        followed = [score_answers(one, follow(one, "bimcc"), has_budget=False) for one in sequences]
+    frames = [frame for one in followed for frame in one.frames]
     ok = [one for one in frames if one.is_ok and one.tre_mm is not None]
     errors = np.array([one.tre_mm for one in ok])
     bounds = np.array([one.bound_mm for one in ok])

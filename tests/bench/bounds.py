@@ -16,6 +16,7 @@ from navapp.control.stages import STAGES
 from navapp.evaluation.following import follow
 from navapp.evaluation.paper.cases import SAMPLES, SITUATIONS, Case, CaseTest, SituationName
 from navapp.evaluation.scores import FrameScore
+from navapp.evaluation.scoring import score_answers
 from navapp.evaluation.sequence import KnownSequence, render_room
 
 FIRST_SEED = 2_000_301
@@ -76,7 +77,8 @@ def _judge_cell(
             stage, situation, number, options.first, options.frames + 1, options.highlights,
             options.misses,
         )  # fmt: skip
-        found = follow(sequence, "bimcc").followed.frames
+        answers = follow(sequence, "bimcc")
+        found = score_answers(sequence, answers, has_budget=False).frames
         if options.knee_rows:
             print(_row(f"{stage} {options.first + number}", situation, found), flush=True)
         frames += found

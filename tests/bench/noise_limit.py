@@ -14,6 +14,7 @@ cause.
 import argparse
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -83,12 +84,12 @@ def _measure(seed: int, stage: str, changes: dict[str, Any]) -> Iterator[tuple[f
     answers = follow(sequence, "bimcc")
     centre_mm = sequence.plan.bones[sequence.stage.bone].mesh.centroid_mm
     targets_mm = sequence.plan.targets_of(sequence.stage.targets)
-    for one in answers.followed.frames:
-        pose, true = answers.poses[one.index], sequence.truth[one.index]
-        if not one.is_ok or pose is None or true is None:
+    answered = zip(sequence.frames, answers.frames, sequence.truth, strict=True)
+    for frame, one, true in islice(answered, 1, None):
+        if not one.is_ok or one.pose is None or true is None:
             continue
         budget = measure_budget(
-            sequence.frames[one.index], pose, true, answers.surface, centre_mm, targets_mm,
+            frame, one.pose, true, answers.surface, centre_mm, targets_mm,
             rectifier_of(sequence.rig), SensorModel(seed=seed),
         )  # fmt: skip
         if budget is not None:

@@ -6,24 +6,26 @@ usage: .venv-peers/bin/python -m tests.bench.peer_frames FOLDER
 FOLDER is one of `navapp evaluate`. Its tests are rendered again from their seeds, and followed by
 every peer from the pose that our registration finds in the first frame. As soon as a test is done,
 its file is written into `peers/`, and its name is printed. Started again, it follows only the tests
-that lack a file, or a peer in it. One test is run at a time, so that the times are those of one
-tracker. `--check` only loads what the peers need.
+that lack a file or a peer in it, or were followed by other code of the peers. One test is run at a
+time, so that the times are those of one tracker. `--check` only loads what the peers need.
 """
 
+import hashlib
 import json
 import sys
 import time
 from dataclasses import dataclass, replace
+from importlib.metadata import distributions
 from pathlib import Path
 
 from navapp.evaluation.following import follow
-from navapp.evaluation.paper.cases import CaseTest
 from navapp.evaluation.paper.settings import TableSettings
 from navapp.evaluation.peers.scores import PeerFrame, PeerTest, read_peers, write_peers
 from navapp.evaluation.sequence import KnownSequence
 from navapp.evaluation.truth import compute_mean_tre_mm
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import RigidTransform
+from navapp.values import Status
 from tests.bench.peer_trackers import Peer, make_peers
 
 # In so many frames the bone is searched for, as in the tests of our own methods.
@@ -38,21 +40,36 @@ def main(argument: str) -> None:
     folder = Path(argument)
     settings = TableSettings.from_json(json.loads((folder / "settings.json").read_text()))
     kept = read_peers(folder, settings.tests)
-    done = {one.test for one in kept if peers.keys() <= one.frames.keys()}
+    code = find_code()
+    done = {one.test for one in kept if one.code == code and peers.keys() <= one.frames.keys()}
     if len(done) < len(settings.tests):
         # What is compiled or loaded at first use belongs to no test's times.
-        follow_with_all(settings.tests[0], settings.render(settings.tests[0], 2), peers)
+        follow_with_all(settings.render(settings.tests[0], 2), peers)
     for test in settings.tests:
         if test not in done:
-            sequence = settings.render(test, settings.count_frames(test))
-            write_peers(folder, follow_with_all(test, sequence, peers))
+            frames = follow_with_all(settings.render(test), peers)
+            write_peers(folder, PeerTest(test, frames, code))
         print(test.name, flush=True)
 
 
-def follow_with_all(test: CaseTest, sequence: KnownSequence, peers: dict[str, Peer]) -> PeerTest:
+def find_code() -> str:
+    """Hash of all that the peers' answers depend on: their files and the libraries' versions."""
+    here = Path(__file__).resolve().parent
+    digest = hashlib.sha256()
+    for path in [*sorted(here.glob("peer_*.py")), *sorted((here / "visp").iterdir())]:
+        if path.is_file():
+            digest.update(path.read_bytes())
+    installed = sorted(f"{one.name} {one.version}" for one in distributions())
+    digest.update("\n".join(installed).encode())
+    return digest.hexdigest()[:12]
+
+
+def follow_with_all(
+    sequence: KnownSequence, peers: dict[str, Peer]
+) -> dict[str, tuple[PeerFrame, ...]]:
     """Every peer, one after the other, from the same first pose."""
     start = find_start(sequence)
-    return PeerTest(test, {name: score(sequence, start, peer) for name, peer in peers.items()})
+    return {name: score(sequence, start, peer) for name, peer in peers.items()}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,14 +82,20 @@ class Start:
 
 
 def find_start(sequence: KnownSequence) -> Start | None:
-    """In the first frame, or in one of the next; None: the bone was not found."""
-    for place in range(min(_MOST_REGISTRATIONS, len(sequence.frames))):
+    """In the first frame, or in one of the next; None: the bone was not found.
+
+    As for our own method a pose must be OK; only the last search is taken if it is not lost.
+    """
+    n_searches = min(_MOST_REGISTRATIONS, len(sequence.frames))
+    for place in range(n_searches):
         part = slice(place, place + 1)
         here = replace(sequence, frames=sequence.frames[part], truth=sequence.truth[part])
         answers = follow(here, "bimcc")
-        (pose,) = answers.poses
-        if answers.followed.registration_s is not None and pose is not None:
-            return Start(place, pose, answers.surface)
+        (found,) = answers.frames
+        is_lost = found.verdict is None or found.verdict.status is Status.LOST
+        is_enough = found.is_ok or (place == n_searches - 1 and not is_lost)
+        if is_enough and found.pose is not None:
+            return Start(place, found.pose, answers.surface)
     return None
 
 

@@ -10,13 +10,13 @@ from drivers.child_python import make_child_environment
 from navapp.cli.main import run
 from navapp.evaluation import campaign
 from navapp.evaluation.ablation import results
-from navapp.evaluation.ablation.settings import FIRST_ABLATION_SEED, VARIANTS, AblationSettings
-from navapp.evaluation.paper.cases import ALL_CASES
+from navapp.evaluation.methods import VARIANTS
+from navapp.evaluation.paper.cases import ALL_CASES, FIRST_ABLATION_SEED
 from navapp.evaluation.paper.settings import TableSettings
 
 
 @pytest.fixture
-def ran(monkeypatch) -> list[AblationSettings]:
+def ran(monkeypatch) -> list[TableSettings]:
     """What would be run; nothing is."""
     kept = []
     wrote = {"summary": {"quick": False, "variants": []}}
@@ -35,8 +35,8 @@ def test_by_default_two_men_of_each_stage_and_situation_are_run(ran, tmp_path) -
     men = tuple(case for case in ALL_CASES if case.sample == "man")
     assert len(men) == 5 * 4
     assert ran == [
-        AblationSettings(TableSettings(men, ("bimcc",), 2, 40, FIRST_ABLATION_SEED)),
-        AblationSettings(TableSettings(men, ("bimcc",), 1, 5, FIRST_ABLATION_SEED, is_quick=True)),
+        TableSettings(men, tuple(VARIANTS), 2, 40, FIRST_ABLATION_SEED),
+        TableSettings(men, tuple(VARIANTS), 1, 5, FIRST_ABLATION_SEED, is_quick=True),
     ]
 
 
@@ -44,11 +44,8 @@ def test_what_is_chosen_stands_in_the_order_of_the_tables(ran, tmp_path) -> None
     chosen = ["--samples", "adult", "man", "--stages", "spacer", "--situations", "overlay"]
     assert ablation(tmp_path / "a", *chosen, "--tests", "3", "--frames", "4", "--seed", "0") == 0
     (settings,) = ran
-    assert [case.name for case in settings.knees.cases] == [
-        "man-spacer-overlay", "adult-spacer-overlay",
-    ]  # fmt: skip
-    knees = settings.knees
-    assert (knees.n_tests, knees.n_frames, knees.first_seed) == (3, 4, 0)
+    assert [case.name for case in settings.cases] == ["man-spacer-overlay", "adult-spacer-overlay"]
+    assert (settings.n_tests, settings.n_frames, settings.first_seed) == (3, 4, 0)
 
 
 @pytest.mark.parametrize(

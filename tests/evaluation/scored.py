@@ -4,7 +4,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from navapp.evaluation.campaign import Done
-from navapp.evaluation.paper.cases import ALL_CASES, METHODS, Case, list_tests
+from navapp.evaluation.methods import METHODS
+from navapp.evaluation.paper.cases import ALL_CASES, Case, list_tests
 from navapp.evaluation.scores import Followed, FrameScore
 from navapp.tracking import Method
 

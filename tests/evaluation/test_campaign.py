@@ -3,17 +3,17 @@
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from types import SimpleNamespace
 
 import pytest
 
+from navapp.config import Configuration
 from navapp.errors import InputError, UsageError
 from navapp.evaluation import campaign
-from navapp.evaluation.campaign import CampaignFolder, run_campaign
-from navapp.evaluation.paper import settings as settings_of_tables
+from navapp.evaluation.campaign import CampaignFolder, Done, run_campaign
 from navapp.evaluation.paper.cases import ALL_CASES, CaseTest
 from navapp.evaluation.paper.results import write_results
 from navapp.evaluation.paper.settings import TableSettings
+from navapp.evaluation.scores import ErrorBudget
 from tests.evaluation.scored import followed, score
 
 pytestmark = pytest.mark.usefixtures("empty_plots")
@@ -44,7 +44,8 @@ class Line:
         assert n_frames in (4, 3), "one frame more than are counted, or those of a warm-up"
         return Pictures(test, [object()] * n_frames)
 
-    def follow(self, sequence, method):
+    def follow(self, sequence, method, leaves_out):
+        assert not leaves_out
         if self.is_killed_at == len(self.done):
             raise KeyboardInterrupt
         self.done.append((sequence.test.seed, method))
@@ -52,9 +53,9 @@ class Line:
         self.total_ms += 1.0
         value = 1e-3 * sequence.test.seed + (0.5 if method == "paper" else 0.0)
         frames = [score(value, index=n, total_ms=self.total_ms) for n in (1, 2, 3)]
-        return SimpleNamespace(followed=followed(*frames, registration_s=1e-3 * self.total_ms))
+        return followed(*frames, registration_s=1e-3 * self.total_ms)
 
-    def draw(self, sequence, _answers) -> bytes | None:
+    def draw(self, sequence, _answers, _scores) -> bytes | None:
         return f"picture of {sequence.test.seed}".encode() if self.has_picture else None
 
 
@@ -68,9 +69,13 @@ def line(monkeypatch) -> Iterator[Line]:
             do(item)
             yield item
 
-    for name, value in (("run_in_processes", run_here), ("draw_worst_frame", line.draw)):
+    for name, value in (
+        ("run_in_processes", run_here),
+        ("draw_worst_frame", line.draw),
+        ("follow", line.follow),
+        ("score_answers", lambda _sequence, answers, *, has_budget: answers),
+    ):
         monkeypatch.setattr(campaign, name, value)
-    monkeypatch.setattr(settings_of_tables, "follow", line.follow)
     monkeypatch.setattr(CaseTest, "render", lambda test, n_frames: line.render(test, n_frames))
     campaign._warm_up.cache_clear()
     yield line
@@ -83,26 +88,19 @@ def run(path, settings=SETTINGS, told=None) -> CampaignFolder:
     return folder
 
 
-@dataclass(frozen=True)
-class Grouped(TableSettings):
-    """All tests share their pictures."""
-
-    def group(self, tests):
-        return [tuple(tests)] if tests else []
-
-
-def test_a_group_is_run_as_a_whole_and_gone_on_within(line: Line, tmp_path) -> None:
-    grouped, told = Grouped(ALL_CASES[:2], ("paper", "bimcc"), 2, 3, 1), []
+def test_a_group_is_run_as_a_whole_and_gone_on_within(line: Line, tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(CaseTest, "configure", lambda test: Configuration())
+    told = []
     line.is_killed_at = 5  # in the third test of four
     with pytest.raises(KeyboardInterrupt):
-        run(tmp_path, grouped)
+        run(tmp_path)
     done = len(list((tmp_path / "tests").iterdir()))
     assert done == 2
     line.is_killed_at = None
-    run(tmp_path, grouped, told)
+    run(tmp_path, told=told)
     assert len(list((tmp_path / "tests").iterdir())) == 4
     # What was done before, and both groups at their ends: two that were left, those for times.
-    n_timed = len(grouped.timed_tests)
+    n_timed = len(SETTINGS.timed_tests)
     assert [n for n, _, _ in told] == [2, 4, 4 + n_timed]
     assert {of for _, of, _ in told} == {4 + n_timed}
     n_followed = sum(method == "bimcc" for _, method in line.done)
@@ -208,8 +206,42 @@ def test_other_settings_are_refused_and_change_nothing(line, tmp_path, other) ->
 def test_other_code_does_not_go_on(line, tmp_path, monkeypatch) -> None:
     run(tmp_path)
     monkeypatch.setattr(campaign, "source_hash", lambda: "99")
-    with pytest.raises(UsageError, match="begun with other code of navapp: go on with that code"):
+    with pytest.raises(UsageError, match="begun with other code of navapp: go on with these"):
         CampaignFolder(tmp_path, SETTINGS)
+
+
+def test_code_that_changes_during_a_run_ends_it(line, tmp_path, monkeypatch) -> None:
+    folder = CampaignFolder(tmp_path, SETTINGS)
+    monkeypatch.setattr(campaign, "source_hash", lambda: "99")
+    with pytest.raises(UsageError, match="changed during the run: go on with the code that began"):
+        run_campaign(folder, SETTINGS, 2, lambda *_: None)
+    assert list((tmp_path / "tests").iterdir()) == []
+
+
+def test_other_libraries_do_not_go_on(line, tmp_path, monkeypatch) -> None:
+    run(tmp_path)
+    monkeypatch.setattr(campaign, "list_libraries", lambda: {"numpy": "0.1"})
+    with pytest.raises(UsageError, match="other libraries"):
+        CampaignFolder(tmp_path, SETTINGS)
+
+
+def test_a_result_that_cannot_be_written_is_told(line, tmp_path, monkeypatch) -> None:
+    folder = CampaignFolder(tmp_path, SETTINGS)
+
+    def refuse(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(campaign, "write_whole", refuse)
+    with pytest.raises(
+        InputError, match=r"written \(No space left on device\): make room"
+    ):
+        run_campaign(folder, SETTINGS, 2, lambda *_: None)
+
+
+def test_times_of_another_machine_are_told(line, tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(campaign, "name_processor", lambda: "an abacus")
+    write_results(run(tmp_path), SETTINGS)
+    assert "times were taken on: an abacus" in (tmp_path / "tables.md").read_text()
 
 
 def test_what_is_not_its_own_is_left_alone(tmp_path) -> None:
@@ -219,7 +251,7 @@ def test_what_is_not_its_own_is_left_alone(tmp_path) -> None:
     assert list(files_of(tmp_path)) == ["thesis.txt"]
     with pytest.raises(UsageError, match="is no folder: choose a new folder"):
         CampaignFolder(tmp_path / "thesis.txt", SETTINGS)
-    with pytest.raises(InputError, match="cannot be made: choose another place"):
+    with pytest.raises(InputError, match="cannot be written: choose another place"):
         CampaignFolder(tmp_path / "thesis.txt" / "a", SETTINGS)
 
 
@@ -243,6 +275,18 @@ def test_a_damaged_file_is_told_before_anything_is_run(line, tmp_path, damage) -
     folder.file_of(SETTINGS.tests[1], is_timed=False).unlink()
     run(tmp_path)
     assert len(line.done) == 2 * 2
+
+
+def test_a_test_is_read_as_it_was_kept(tmp_path) -> None:
+    folder = CampaignFolder(tmp_path, SETTINGS)
+    one = followed(
+        score(0.3, budget=ErrorBudget(0.01, 0.02, 0.03, 0.3), claimed_mm=(0.1, 0.2, 0.3, 0.4)),
+        score(None, "LOST", reasons=("a", "b"), seen=None),
+    )
+    test = SETTINGS.tests[0]
+    folder.write(Done(test, {"paper": one, "bimcc": one}, "a computer"), is_timed=False)
+    (kept,) = folder.read(is_timed=False)
+    assert kept == Done(test, {"paper": one, "bimcc": one}, "a computer")
 
 
 def test_damaged_settings_are_told(tmp_path) -> None:

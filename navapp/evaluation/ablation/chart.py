@@ -28,9 +28,9 @@ def draw_variants(rows: Sequence[VariantRow]) -> str:
 
 def _draw_errors(axes: Any, rows: Sequence[VariantRow]) -> None:
     for label, values, marker, colour in (
-        ("OK, mean", [row.tre_ok_mm for row in rows], "o", BLUE),
-        ("OK, worst", [row.worst_ok_mm for row in rows], "x", BLUE),
-        ("all, mean", [row.tre_any_mm for row in rows], "s", ORANGE),
+        ("OK, mean", [row.figures.ok.mean_mm for row in rows], "o", BLUE),
+        ("OK, worst", [row.figures.ok.worst_mm for row in rows], "x", BLUE),
+        ("all, mean", [row.figures.mean_mm for row in rows], "s", ORANGE),
     ):
         known = [(value, place) for place, value in enumerate(values) if value is not None]
         if known:
@@ -42,10 +42,10 @@ def _draw_errors(axes: Any, rows: Sequence[VariantRow]) -> None:
 
 def _draw_shares(axes: Any, rows: Sequence[VariantRow]) -> None:
     for shift, label, counts, colour in (
-        (-0.2, "OK", [row.n_ok for row in rows], BLUE),
-        (0.2, "OK and wrong", [row.n_wrong for row in rows], ORANGE),
+        (-0.2, "OK", [row.figures.n_ok for row in rows], BLUE),
+        (0.2, "OK and wrong", [row.figures.n_wrong for row in rows], ORANGE),
     ):
-        widths = [n / max(row.n_frames, 1) for n, row in zip(counts, rows, strict=True)]
+        widths = [n / max(row.figures.n_frames, 1) for n, row in zip(counts, rows, strict=True)]
         places = [place + shift for place in range(len(rows))]
         axes.barh(places, widths, 0.36, color=colour, label=label)
     axes.set(xlabel="share of frames", xlim=(0.0, 1.0))

@@ -1,17 +1,17 @@
 """A row of the ablation: what a variant reached in a stage and situation, over all samples."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from itertools import product
 from operator import attrgetter
 from typing import Any, Final, Literal
 
 import numpy as np
 
-from navapp.evaluation.ablation.settings import VARIANTS, WHOLE
 from navapp.evaluation.campaign import Done
+from navapp.evaluation.frame_figures import FrameFigures, find_mean, pool_frames
+from navapp.evaluation.methods import OURS, VARIANTS
 from navapp.evaluation.paper.cases import SITUATIONS, STAGE_NAMES, CaseTest, SituationName
-from navapp.evaluation.paper.rows import is_within_bound, is_wrong
 from navapp.evaluation.scores import FrameScore
 
 ALL: Final = "all"
@@ -20,22 +20,15 @@ SituationOrAll = SituationName | Literal["all"]
 ALIKE_MM = 0.001
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class VariantRow:
-    """Of one variant; None where no frame has the figure."""
+    """Of one variant."""
 
     stage: str  # or `ALL`, then with the situation `ALL`
     situation: SituationOrAll
     variant: str
     n_tests: int
-    n_frames: int
-    n_ok: int
-    # Mean errors over the stage's targets, mm: of OK frames, and of all that have a pose.
-    tre_ok_mm: float | None
-    tre_any_mm: float | None
-    worst_ok_mm: float | None
-    n_wrong: int  # OK, further off than 1 mm and than their bound
-    coverage: float | None  # of OK frames, the share within their bound
+    figures: FrameFigures
     # Frames compared with those of the whole method: verdict, errors and bound are the same to the
     # last bit; the status is the same, and the error differs by at most `ALIKE_MM`.
     n_same: int
@@ -46,14 +39,28 @@ class VariantRow:
     mean_ms: float | None
     registration_s: float | None
 
-    @property
-    def ok_share(self) -> float:
-        """Of all counted frames."""
-        return self.n_ok / max(self.n_frames, 1)
-
     def to_json(self) -> dict[str, Any]:
         """Named values."""
-        return {**asdict(self), "ok_share": self.ok_share}
+        figures = self.figures
+        return {
+            "stage": self.stage,
+            "situation": self.situation,
+            "variant": self.variant,
+            "n_tests": self.n_tests,
+            "n_frames": figures.n_frames,
+            "n_ok": figures.n_ok,
+            "ok_share": figures.ok_share,
+            "tre_ok_mm": figures.ok.mean_mm,
+            "tre_any_mm": figures.mean_mm,
+            "worst_ok_mm": figures.ok.worst_mm,
+            "n_wrong": figures.n_wrong,
+            "coverage": figures.bound_coverage,
+            "n_same": self.n_same,
+            "n_alike": self.n_alike,
+            "median_ms": self.median_ms,
+            "mean_ms": self.mean_ms,
+            "registration_s": self.registration_s,
+        }
 
 
 def make_variant_rows(
@@ -86,27 +93,22 @@ def _make_row(
     done: Sequence[Done[CaseTest]],
     timed: Sequence[Done[CaseTest]],
 ) -> VariantRow:
-    frames = [frame for one in done for frame in one.followed[variant].frames]
-    whole = [frame for one in done for frame in one.followed[WHOLE].frames]
-    ok = [frame for frame in frames if frame.is_ok and frame.tre_mm is not None]
+    figures, whole = (
+        pool_frames(one.followed[name].frames for one in done) for name in (variant, OURS)
+    )
+    pairs = list(zip(figures.frames, whole.frames, strict=True))
     times_ms = [ms for one in timed for ms in one.followed[variant].times_ms]
     return VariantRow(
         stage=stage,
         situation=situation,
         variant=variant,
         n_tests=len(done),
-        n_frames=len(frames),
-        n_ok=len(ok),
-        tre_ok_mm=_mean([frame.tre_mm for frame in ok]),
-        tre_any_mm=_mean([frame.tre_mm for frame in frames]),
-        worst_ok_mm=max((frame.tre_mm or 0.0 for frame in ok), default=None),
-        n_wrong=sum(is_wrong(frame) for frame in ok),
-        coverage=_mean([is_within_bound(frame) for frame in ok]),
-        n_same=sum(_is_same(*both) for both in zip(frames, whole, strict=True)),
-        n_alike=sum(_is_alike(*both) for both in zip(frames, whole, strict=True)),
+        figures=figures,
+        n_same=sum(_is_same(*both) for both in pairs),
+        n_alike=sum(_is_alike(*both) for both in pairs),
         median_ms=float(np.median(times_ms)) if times_ms else None,
-        mean_ms=_mean(times_ms),
-        registration_s=_mean([one.followed[variant].registration_s for one in timed]),
+        mean_ms=find_mean(times_ms),
+        registration_s=find_mean(one.followed[variant].registration_s for one in timed),
     )
 
 
@@ -123,8 +125,3 @@ def _is_alike(one: FrameScore, other: FrameScore) -> bool:
     if one.tre_mm is None or other.tre_mm is None:
         return (one.status, one.tre_mm) == (other.status, other.tre_mm)
     return one.status == other.status and abs(one.tre_mm - other.tre_mm) <= ALIKE_MM
-
-
-def _mean(values: Sequence[float | None]) -> float | None:
-    known = [value for value in values if value is not None]
-    return float(np.mean(known)) if known else None

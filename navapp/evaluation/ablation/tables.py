@@ -3,9 +3,15 @@
 from collections.abc import Sequence
 
 from navapp.evaluation.ablation.rows import ALIKE_MM, ALL, SituationOrAll, VariantRow
-from navapp.evaluation.ablation.settings import WHOLE, WITHOUT_FILL
+from navapp.evaluation.methods import OURS, WITHOUT_FILL
 from navapp.evaluation.paper.cases import SITUATIONS
-from navapp.evaluation.paper.tables import format_mm
+from navapp.evaluation.report_parts import (
+    format_mm,
+    format_number,
+    format_share,
+    format_table,
+    make_quick_note,
+)
 
 _ABOUT = (
     "`bimcc` is the method of the product; every other row leaves one part of it out, and follows "
@@ -49,11 +55,7 @@ def make_ablation_tables(
     """
     parts = ["# What each part is worth, on simulated knees", ""]
     if is_quick:
-        parts += [
-            "**A quick look: one short test of each case, times taken while others ran. These are "
-            "no results.**",
-            "",
-        ]
+        parts += make_quick_note("one short test of each case, times taken while others ran")
     parts += [*(f"- {line}" for line in about), "", _ABOUT, *_PARTS, ""]
     places = list(dict.fromkeys((row.stage, row.situation) for row in rows))
     for place in places:
@@ -65,44 +67,42 @@ def make_ablation_tables(
 def _format_place(stage: str, situation: SituationOrAll, rows: Sequence[VariantRow]) -> list[str]:
     """The table of one stage and situation; that of all has the registration's time as well."""
     is_all = situation == ALL
-    columns = [*_COLUMNS, "registration, s"] if is_all else [*_COLUMNS]
+    head = ["", *_COLUMNS, *(["registration, s"] if is_all else [])]
     lines = [
         "## All stages and situations"
         if situation == ALL
         else f"## Stage {stage}, {SITUATIONS[situation].title}",
         "",
-        f"Tests: {rows[0].n_tests}, frames: {rows[0].n_frames}.",
+        f"Tests: {rows[0].n_tests}, frames: {rows[0].figures.n_frames}.",
         "",
-        f"| | {' | '.join(columns)} |",
-        "|---" * (len(columns) + 1) + "|",
+        *format_table(head, (_format_row(row, has_registration=is_all) for row in rows)),
     ]
-    lines += [_format_row(row, has_registration=is_all) for row in rows]
     return [*lines, "", _tell_fill(rows)] if is_all else lines
 
 
-def _format_row(row: VariantRow, *, has_registration: bool) -> str:
+def _format_row(row: VariantRow, *, has_registration: bool) -> list[str]:
+    figures = row.figures
     cells = [
-        f"`{row.variant}`" if row.variant == WHOLE else row.variant,
-        _share(row.ok_share),
-        format_mm(row.tre_ok_mm),
-        format_mm(row.tre_any_mm),
-        format_mm(row.worst_ok_mm),
-        f"{row.n_wrong}",
-        _share(row.coverage),
-        _share(row.n_alike / max(row.n_frames, 1)),
-        _number(row.median_ms, 0),
-        _number(row.mean_ms, 0),
+        f"`{row.variant}`" if row.variant == OURS else row.variant,
+        format_share(figures.ok_share),
+        format_mm(figures.ok.mean_mm),
+        format_mm(figures.mean_mm),
+        format_mm(figures.ok.worst_mm),
+        str(figures.n_wrong),
+        format_share(figures.bound_coverage),
+        format_share(row.n_alike / max(figures.n_frames, 1)),
+        format_number(row.median_ms),
+        format_number(row.mean_ms),
     ]
-    cells += [_number(row.registration_s, 2)] if has_registration else []
-    return "| " + " | ".join(cells) + " |"
+    return [*cells, format_number(row.registration_s, 2)] if has_registration else cells
 
 
 def _tell_fill(rows: Sequence[VariantRow]) -> str:
     """What the fill changes and costs, of the rows of one place."""
     found = {row.variant: row for row in rows}
-    whole, without = found[WHOLE], found[WITHOUT_FILL]
+    whole, without = found[OURS], found[WITHOUT_FILL]
     told = (
-        f"Without filled depth {without.n_same} of {without.n_frames} frames have the same "
+        f"Without filled depth {without.n_same} of {without.figures.n_frames} frames have the same "
         "verdict, errors and bound to the last bit."
     )
     if whole.median_ms is None or without.median_ms is None:
@@ -111,16 +111,3 @@ def _tell_fill(rows: Sequence[VariantRow]) -> str:
         f"{told} The median frame took {whole.median_ms:.1f} ms with the fill, and "
         f"{without.median_ms:.1f} ms without it and the hiding of guides."
     )
-
-
-def _number(value: float | None, n_digits: int) -> str:
-    return "-" if value is None else f"{value:.{n_digits}f}"
-
-
-def _share(value: float | None) -> str:
-    """Whole; only all is 100 %, and only nothing 0 %."""
-    if value is None:
-        return "-"
-    if 0.0 < value < 0.01:
-        return "< 1 %"
-    return "> 99 %" if 0.99 < value < 1.0 else f"{100.0 * value:.0f} %"

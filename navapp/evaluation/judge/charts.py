@@ -10,7 +10,7 @@ _LINES = {
     "bound": ("by the bound", "#2b6cb0"),
     "rms": ("by the residual", "#c05621"),
     "coverage": ("by the share seen", "#2f855a"),
-    "error": ("by the error itself", "#718096"),
+    "error": ("by the true error", "#718096"),
 }
 _GREY = "#718096"
 

@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from navapp.evaluation.paper.rows import WRONG_MM
-from navapp.evaluation.scores import FrameScore
+from navapp.evaluation.scores import WRONG_MM, FrameScore
 from navapp.geometry.transform import FloatArray
 
 Flags = NDArray[np.bool_]
@@ -150,7 +149,8 @@ def trace_roc(score: FloatArray, is_wrong: Flags) -> FloatArray:
         return np.empty((0, 2))
     order = np.argsort(-score, kind="stable")
     # Frames with the same score are refused together.
-    is_last = np.append(np.diff(score[order]) != 0.0, True)
+    ranked = score[order]
+    is_last = np.append(ranked[1:] != ranked[:-1], True)  # a difference of two infinities is none
     wrong = np.cumsum(is_wrong[order])[is_last] / n_wrong
     right = np.cumsum(~is_wrong[order])[is_last] / n_right
     return np.vstack([[0.0, 0.0], np.column_stack([right, wrong])])

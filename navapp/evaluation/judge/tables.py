@@ -5,13 +5,13 @@ from collections.abc import Mapping, Sequence
 from navapp.evaluation.judge.rejector import SHARES, TOLD_SHARES, Rejector
 from navapp.evaluation.judge.reliability import BoundQuality, Reliability
 from navapp.evaluation.noise_limit.summary import LEAST_EFFICIENCY, STEPS, Efficiency
-from navapp.evaluation.paper.rows import WRONG_MM
+from navapp.evaluation.scores import WRONG_MM
 
 _REJECTED_BY = {
     "bound": "the judge's bound",
     "rms": "residual over the expected one",
     "coverage": "share of the bone that is seen",
-    "error": "the error itself: nobody has it",
+    "error": "the true error (unknown in use)",
 }
 _STEP_NAMES = {
     "pictures": "the pictures: highlights, edges, interpolation",
@@ -120,7 +120,7 @@ def _format_limits(limits: Mapping[str, Efficiency], titles: Mapping[str, str]) 
         "square.",
         "",
         f"| situation | frames | knees | limit | ideal | matched | reached | efficiency | "
-        f"{', '.join(STEPS)} add, mm^2 | most is added by |",
+        f"{', '.join(STEPS)} add, mm^2 | largest contribution |",
         "|---" * 10 + "|",
     ]
     for name, one in limits.items():

@@ -6,18 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from calibration.report.plots import draw_svg
+from calibration.report.plots import BLUE, GREY, ORANGE, draw_svg
 from navapp.evaluation.paper.cases import SITUATIONS, STAGE_NAMES, SituationName
 from navapp.evaluation.paper.published import Published, find_published
 from navapp.evaluation.paper.rows import Row, find_ours
 from navapp.geometry.transform import FloatArray
 from navapp.tracking import Method
 
-_METHODS: dict[Method, tuple[str, str]] = {
-    "icp": ("icp", "#718096"),
-    "paper": ("paper", "#c05621"),
-    "bimcc": ("bimcc", "#2b6cb0"),
-}
+_METHODS: dict[Method, str] = {"icp": GREY, "paper": ORANGE, "bimcc": BLUE}
 _SHORT: dict[SituationName, str] = {
     "registration": "registration",
     "overlay": "overlay",
@@ -40,7 +36,7 @@ def draw_stages(rows: Sequence[Row]) -> str:
         errors, shares = figure.subplots(1, 2)
         _draw_by_stage(errors, rows, lambda row: row.tre_mm)
         errors.set(ylabel="TRE of OK frames, mm, mean")
-        _draw_by_stage(shares, rows, lambda row: 100.0 * row.ok_share)
+        _draw_by_stage(shares, rows, lambda row: 100.0 * row.figures.ok_share)
         shares.set(ylabel="OK, % of frames", ylim=(0.0, 100.0))
         names = [
             Patch(color=colour, label=_SHORT[one])
@@ -98,8 +94,8 @@ def _draw(
         ("state of the art, as printed", "#cbd5e0", _middle_printed(rows, published[0])),
         ("proposal, as printed", "#fbd38d", _middle_printed(rows, published[1])),
     ]
-    for method, (name, colour) in _METHODS.items():
-        bars.append((f"{name}, here", colour, _middle(rows, method, value_of)))
+    for method, colour in _METHODS.items():
+        bars.append((f"{method}, here", colour, _middle(rows, method, value_of)))
 
     def draw(figure: Any) -> None:
         axes = figure.add_subplot()

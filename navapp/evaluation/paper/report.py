@@ -1,14 +1,13 @@
 """The report of an evaluation: one HTML file with tables, charts and a picture of each case."""
 
-import base64
 from collections.abc import Mapping, Sequence
-from html import escape
 
 from calibration.report.page import make_html, make_note
+from navapp.evaluation.methods import OURS
 from navapp.evaluation.paper.cases import Case
 from navapp.evaluation.paper.charts import draw_errors, draw_rates, draw_stages
 from navapp.evaluation.paper.rows import Row
-from navapp.evaluation.paper.tables import format_mm
+from navapp.evaluation.report_parts import format_mm, make_figure, render_markdown
 
 _PICTURES = (
     "The worst frame of each case that the judge calls OK: white is where the bone is, green where "
@@ -40,23 +39,10 @@ def make_report(
 
 
 def _show(pictures: Mapping[Case, bytes], rows: Sequence[Row]) -> str:
-    ours = {row.case: row for row in rows if row.method == "bimcc"}
+    ours = {row.case: row for row in rows if row.method == OURS}
     figures = []
     for case, picture in pictures.items():
         row = ours.get(case)
         told = "" if row is None else f": mean TRE of the case {format_mm(row.tre_mm)} mm"
-        data = base64.b64encode(picture).decode("ascii")
-        figures.append(
-            f'<figure style="display:inline-block;margin:.5em"><img alt="{escape(case.name)}" '
-            f'src="data:image/jpeg;base64,{data}"><figcaption>{escape(case.name + told)}'
-            "</figcaption></figure>"
-        )
+        figures.append(make_figure(picture, case.name + told))
     return "".join(figures)
-
-
-def render_markdown(text: str) -> str:
-    """Markdown with tables as HTML."""
-    from markdown_it import MarkdownIt
-
-    rendered: str = MarkdownIt("commonmark").enable("table").render(text)
-    return rendered

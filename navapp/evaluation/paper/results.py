@@ -1,33 +1,27 @@
 """Writes what a campaign has found: tables, report, JSON and every frame as CSV."""
 
-import csv
-import io
-from collections.abc import Sequence
-from pathlib import Path
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from navapp.evaluation.campaign import CampaignFolder, Done
+from navapp.evaluation.frame_figures import FrameFigures
+from navapp.evaluation.judge.figures import JudgeFigures, judge_method
 from navapp.evaluation.judge.findings import JudgeFindings, examine_judge
+from navapp.evaluation.methods import OURS
 from navapp.evaluation.paper.cases import INSTRUMENT_S, SWEEP_FRAMES, Case, CaseTest
 from navapp.evaluation.paper.charts import draw_errors, draw_stages
 from navapp.evaluation.paper.report import make_report
 from navapp.evaluation.paper.rows import Row, make_row
 from navapp.evaluation.paper.settings import TableSettings
-from navapp.evaluation.paper.summary import Judged, compare_with_paper, judge_method
+from navapp.evaluation.paper.summary import compare_with_paper
 from navapp.evaluation.paper.tables import make_tables
 from navapp.evaluation.peers.rows import make_peer_rows
 from navapp.evaluation.peers.scores import read_peers
 from navapp.evaluation.peers.tables import format_peers, make_peer_csv
-from navapp.evaluation.provenance import describe_origin
-from navapp.evaluation.scores import LEVELS, FrameScore
+from navapp.evaluation.provenance import describe_origin, name_processor
+from navapp.evaluation.report_parts import make_frames_csv
+from navapp.evaluation.scores import FrameScore
 from navapp.geometry.whole_files import write_whole
-
-_COLUMNS = (
-    "index", "status", "tre_mm", "displacement_mm", "outline_mm", "bound_mm", "seen", "hidden",
-    "total_ms", "is_search", "rms_ratio",
-)  # fmt: skip
-_CLAIMED_COLUMNS = tuple(f"claimed_{100.0 * level:.0f}_mm" for level in LEVELS)
-_BUDGET_COLUMNS = ("limit_mm", "ideal_mm", "matched_mm", "reached_mm")
 
 
 def write_results(folder: CampaignFolder[CaseTest], settings: TableSettings) -> dict[str, Any]:
@@ -43,14 +37,14 @@ def write_results(folder: CampaignFolder[CaseTest], settings: TableSettings) -> 
         for method in settings.methods
         if _of(case, done)
     ]
-    judged = [judge_method(method, done) for method in settings.methods]
+    judged = [judge_method(method, _by_knee(method, done)) for method in settings.methods]
     findings = _examine(done)
     peers = read_peers(folder.path, settings.tests)
     peer_rows = make_peer_rows(peers, done, timed)
     tables = make_tables(
         rows,
         judged,
-        _about(settings, done),
+        _about(settings, done, timed),
         [*findings.to_lines(), *format_peers(peer_rows)],
         is_quick=settings.is_quick,
     )
@@ -60,7 +54,7 @@ def write_results(folder: CampaignFolder[CaseTest], settings: TableSettings) -> 
     write_whole(folder.path / "report.html", report.encode())
     write_whole(folder.path / "stages.svg", draw_stages(rows).encode())
     write_whole(folder.path / "errors.svg", draw_errors(rows).encode())
-    write_whole(folder.path / "frames.csv", _make_csv(done).encode())
+    write_whole(folder.path / "frames.csv", make_case_csv(done, "method").encode())
     if peers:
         write_whole(folder.path / "peers.csv", make_peer_csv(peers).encode())
     return {
@@ -75,17 +69,22 @@ def _of(case: Case, done: Sequence[Done[CaseTest]]) -> list[Done[CaseTest]]:
     return [one for one in done if one.test.case == case]
 
 
+def _by_knee(method: str, done: Sequence[Done[CaseTest]]) -> list[tuple[int, Sequence[FrameScore]]]:
+    return [(one.test.seed, one.followed[method].frames) for one in done]
+
+
 def _examine(done: Sequence[Done[CaseTest]]) -> JudgeFindings:
     """Our method alone: the judge was made for it."""
     knees: dict[str, list[Sequence[FrameScore]]] = {}
     for one in done:
-        if "bimcc" in one.followed:
-            frames = one.followed["bimcc"].frames
-            knees.setdefault(one.test.case.situation, []).append(frames)
+        if OURS in one.followed:
+            knees.setdefault(one.test.case.situation, []).append(one.followed[OURS].frames)
     return examine_judge(knees)
 
 
-def _about(settings: TableSettings, done: Sequence[Done[CaseTest]]) -> list[str]:
+def _about(
+    settings: TableSettings, done: Sequence[Done[CaseTest]], timed: Sequence[Done[CaseTest]]
+) -> list[str]:
     return [
         describe_origin(),
         f"{len(done)} of {len(settings.tests)} tests, each another knee, {settings.n_frames} "
@@ -93,8 +92,17 @@ def _about(settings: TableSettings, done: Sequence[Done[CaseTest]]) -> list[str]
         _tell_sweep(settings),
         "age changes the fine relief of the simulated bones only: 0.10 mm (20 to 30) against "
         "0.15 mm (35 to 45), root mean square",
+        *_tell_machines(timed),
         "simulated devices; research software, not for clinical use",
     ]
+
+
+def _tell_machines(timed: Sequence[Done[CaseTest]]) -> list[str]:
+    """Where times were taken, unless that is told already."""
+    machines = {one.machine for one in timed}
+    if machines <= {name_processor()}:
+        return []
+    return [f"times were taken on: {'; '.join(sorted(machines))}"]
 
 
 def _tell_sweep(settings: TableSettings) -> str:
@@ -111,7 +119,7 @@ def _tell_sweep(settings: TableSettings) -> str:
 
 def _summarise(
     rows: Sequence[Row],
-    judged: Sequence[Judged],
+    judged: Sequence[JudgeFigures],
     settings: TableSettings,
     done: Sequence[Done[CaseTest]],
 ) -> dict[str, Any]:
@@ -127,42 +135,29 @@ def _summarise(
 def _find_pictures(
     folder: CampaignFolder[CaseTest], settings: TableSettings, done: Sequence[Done[CaseTest]]
 ) -> dict[Case, bytes]:
-    """Of each case that of the test with the worst frame that is OK."""
+    """For each case, the picture of the test with the largest error that is OK."""
     pictures = {}
     for case in settings.cases:
         with_picture = [one for one in _of(case, done) if folder.picture_of(one.test).is_file()]
         if with_picture:
             worst = max(with_picture, key=_worst_mm)
-            pictures[case] = Path(folder.picture_of(worst.test)).read_bytes()
+            pictures[case] = folder.picture_of(worst.test).read_bytes()
     return pictures
 
 
 def _worst_mm(done: Done[CaseTest]) -> float:
-    ours = done.followed.get("bimcc")
-    frames = () if ours is None else ours.frames
-    return max((one.tre_mm or 0.0 for one in frames if one.is_ok), default=0.0)
+    ours = done.followed.get(OURS)
+    return 0.0 if ours is None else FrameFigures(ours.frames).ok.worst_mm or 0.0
 
 
-def _make_csv(done: Sequence[Done[CaseTest]]) -> str:
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(
-        ("sample", "stage", "situation", "test", "seed", "method", *_COLUMNS, "reasons",
-         *_CLAIMED_COLUMNS, *_BUDGET_COLUMNS)
-    )  # fmt: skip
-    for one in done:
-        case = one.test.case
-        for method, followed in one.followed.items():
-            for frame in followed.frames:
-                values = (getattr(frame, name) for name in _COLUMNS)
-                writer.writerow(
-                    (case.sample, case.stage, case.situation, one.test.number, one.test.seed,
-                     method, *values, "; ".join(frame.reasons), *_tell_more(frame))
-                )  # fmt: skip
-    return out.getvalue()
+def make_case_csv(done: Sequence[Done[CaseTest]], what: str) -> str:
+    """Every frame of tests; `what` the names of those that followed them are: method, variant."""
 
+    def list_frames() -> Iterator[tuple[Sequence[object], FrameScore]]:
+        for one in done:
+            test, case = one.test, one.test.case
+            for name, followed in one.followed.items():
+                keys = case.sample, case.stage, case.situation, test.number, test.seed, name
+                yield from ((keys, frame) for frame in followed.frames)
 
-def _tell_more(frame: FrameScore) -> list[float | None]:
-    """The bounds at all levels, and the error budget."""
-    claimed = [None] * len(LEVELS) if frame.claimed_mm is None else [*frame.claimed_mm]
-    return [*claimed, *(getattr(frame.budget, name, None) for name in _BUDGET_COLUMNS)]
+    return make_frames_csv(("sample", "stage", "situation", "test", "seed", what), list_frames())

@@ -7,77 +7,85 @@ from typing import Any
 import numpy as np
 
 from navapp.evaluation.campaign import Done
+from navapp.evaluation.frame_figures import FrameFigures, find_mean, pool_frames
+from navapp.evaluation.methods import OURS
 from navapp.evaluation.paper.cases import Case, CaseTest
 from navapp.evaluation.resampled_knees import find_mean_interval
 from navapp.evaluation.scores import Followed, FrameScore
-from navapp.tracking import Method
-
-# A pose that is called OK and further off than this, and than its bound, is wrong.
-WRONG_MM = 1.0
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Row:
     """Of one case and one method."""
 
     case: Case
-    method: Method
-    # Means over frames, mm: of ours over those that the judge calls OK; of the paper's two methods
-    # over all that have a pose, because our judge is not theirs. None without any.
-    overlay_mm: float | None
-    outline_mm: float | None
-    tre_mm: float | None
-    tre_ci95: tuple[float, float] | None  # over tests
-    overlay_ci95: tuple[float, float] | None
-    tre_worst_mm: float | None  # of frames that the judge calls OK
-    tre_refused_mm: float | None  # of poses that the judge refuses
-    ok_share: float
-    n_refused: int  # frames that are not OK
-    n_wrong: int  # frames that are OK, wrong and beyond their bound
-    coverage: float | None  # of OK frames, the share within their bound
-    n_ok: int
-    n_frames: int
+    method: str
     seeds: tuple[int, ...]
-    # from the pass of its own; None before it: processing time of a frame, and of a registration.
-    p50_ms: float | None
-    p95_ms: float | None
-    fps: float | None
+    figures: FrameFigures  # of all frames
+    # Frames whose errors count: of ours those that the judge calls OK; of the paper's two methods
+    # all that have a pose, because our judge is not theirs.
+    counted: FrameFigures
+    # 95 % intervals of the means over `counted`, over tests.
+    tre_ci95: tuple[float, float] | None
+    overlay_ci95: tuple[float, float] | None
+    # from the pass of its own, of one knee: time of each frame, and mean time of a registration;
+    # none before it.
+    times_ms: tuple[float, ...]
     registration_s: float | None
+
+    @property
+    def tre_mm(self) -> float | None:
+        """Mean over the counted frames."""
+        return self.counted.mean_mm
+
+    @property
+    def overlay_mm(self) -> float | None:
+        """Mean over the counted frames."""
+        return self.counted.mean_displacement_mm
+
+    @property
+    def fps(self) -> float | None:
+        """One over the mean time of a frame."""
+        mean_ms = find_mean(self.times_ms)
+        return None if mean_ms is None else 1e3 / mean_ms
 
     def to_json(self) -> dict[str, Any]:
         """As in `evaluate.json`."""
+        figures, counted, times_ms = self.figures, self.counted, self.times_ms
         return {
             "sample": self.case.sample,
             "stage": self.case.stage,
             "situation": self.case.situation,
             "method": self.method,
             "overlay_error_mm": self.overlay_mm,
-            "outline_error_mm": self.outline_mm,
+            "outline_error_mm": counted.mean_outline_mm,
             "tre_mm": self.tre_mm,
-            "tre_worst_mm": self.tre_worst_mm,
-            "tre_refused_mm": self.tre_refused_mm,
+            "tre_worst_mm": figures.ok.worst_mm,
+            "tre_refused_mm": figures.refused.mean_mm,
             "ci95": {"tre_mm": self.tre_ci95, "overlay_error_mm": self.overlay_ci95},
-            "ok_share": self.ok_share,
-            "refused": self.n_refused,
-            "wrong_and_ok": self.n_wrong,
-            "bound_coverage": self.coverage,
+            "ok_share": figures.ok_share,
+            "refused": figures.n_frames - figures.n_ok,
+            "wrong_and_ok": figures.n_wrong,
+            "bound_coverage": figures.bound_coverage,
             "fps": self.fps,
-            "latency_ms": {"p50": self.p50_ms, "p95": self.p95_ms},
+            "latency_ms": {
+                f"p{q}": float(np.percentile(times_ms, q)) if times_ms else None for q in (50, 95)
+            },
             "registration_s": self.registration_s,
             "tests": len(self.seeds),
-            "frames": self.n_frames,
+            "frames": figures.n_frames,
             "seeds": list(self.seeds),
         }
 
 
 def find_ours(rows: Sequence[Row], stage: str, situation: str) -> list[Row]:
     """Those of our method in one stage and situation, of all samples."""
-    wanted = ("bimcc", stage, situation)
+    wanted = (OURS, stage, situation)
     return [row for row in rows if (row.method, row.case.stage, row.case.situation) == wanted]
 
 
 def make_row(
-    case: Case, method: Method, done: Sequence[Done[CaseTest]], timed: Sequence[Done[CaseTest]]
+    case: Case, method: str, done: Sequence[Done[CaseTest]], timed: Sequence[Done[CaseTest]]
 ) -> Row:
     """Pool the tests of a case.
 
@@ -88,76 +96,36 @@ def make_row(
         timed: tests of the pass in which times were taken.
     """
     tests = [one.followed[method] for one in done]
-    frames = [frame for test in tests for frame in test.frames]
-    ok = [frame for frame in frames if frame.is_ok and frame.tre_mm is not None]
-    times_ms, fps, registration_s = _time([one.followed[method] for one in timed])
-    within = [is_within_bound(frame) for frame in ok]
+    figures = pool_frames(test.frames for test in tests)
+    in_time = [one.followed[method] for one in timed]
     return Row(
         case=case,
         method=method,
-        overlay_mm=_mean([one.displacement_mm for one in _counted(frames, method)]),
-        outline_mm=_mean([one.outline_mm for one in _counted(frames, method)]),
-        tre_mm=_mean([one.tre_mm for one in _counted(frames, method)]),
+        seeds=tuple(one.test.seed for one in done),
+        figures=figures,
+        counted=count_errors(figures, method),
         tre_ci95=_resample(tests, method, lambda frame: frame.tre_mm),
         overlay_ci95=_resample(tests, method, lambda frame: frame.displacement_mm),
-        tre_worst_mm=max((frame.tre_mm for frame in ok if frame.tre_mm is not None), default=None),
-        tre_refused_mm=_mean([frame.tre_mm for frame in frames if not frame.is_ok]),
-        ok_share=len(ok) / max(len(frames), 1),
-        n_refused=len(frames) - len(ok),
-        n_wrong=sum(is_wrong(frame) for frame in ok),
-        coverage=float(np.mean(within)) if within else None,
-        n_ok=len(ok),
-        n_frames=len(frames),
-        seeds=tuple(one.test.seed for one in done),
-        p50_ms=None if times_ms is None else float(np.percentile(times_ms, 50)),
-        p95_ms=None if times_ms is None else float(np.percentile(times_ms, 95)),
-        fps=fps,
-        registration_s=registration_s,
+        times_ms=tuple(ms for test in in_time for ms in test.times_ms),
+        registration_s=find_mean(test.registration_s for test in in_time),
     )
 
 
-def is_within_bound(frame: FrameScore) -> bool:
-    """The error of an OK frame is below what its judge predicts for 95 of 100."""
-    known = frame.tre_mm is not None and frame.bound_mm is not None
-    return known and (frame.tre_mm or 0.0) <= (frame.bound_mm or 0.0)
-
-
-def is_wrong(frame: FrameScore) -> bool:
-    """It is called OK, and is further off than `WRONG_MM` and than its bound."""
-    is_far = frame.tre_mm is not None and frame.tre_mm > WRONG_MM
-    return frame.is_ok and is_far and not is_within_bound(frame)
-
-
-def _counted(frames: Sequence[FrameScore], method: Method) -> list[FrameScore]:
+def count_errors(figures: FrameFigures, method: str) -> FrameFigures:
     """Frames whose errors count for a method, as `Row` says."""
-    return [frame for frame in frames if frame.is_ok or method != "bimcc"]
-
-
-def _mean(values: Sequence[float | None]) -> float | None:
-    known = [value for value in values if value is not None]
-    return float(np.mean(known)) if known else None
+    return figures.ok if method == OURS else figures.with_error
 
 
 def _resample(
-    tests: Sequence[Followed], method: Method, value_of: Callable[[FrameScore], float | None]
+    tests: Sequence[Followed], method: str, value_of: Callable[[FrameScore], float | None]
 ) -> tuple[float, float] | None:
     """95 % interval of the mean, by drawing tests anew (percentile bootstrap)."""
     sums, counts = list[float](), list[int]()
     for test in tests:
-        values = [value_of(frame) for frame in _counted(test.frames, method)]
+        values = [
+            value_of(frame) for frame in count_errors(FrameFigures(test.frames), method).frames
+        ]
         known = [value for value in values if value is not None]
         sums.append(float(np.sum(known)))
         counts.append(len(known))
     return find_mean_interval(sums, counts)
-
-
-def _time(
-    tests: Sequence[Followed],
-) -> tuple[list[float] | None, float | None, float | None]:
-    """Times of frames in which a bone was followed, frames a second, seconds of a registration."""
-    times_ms = [ms for test in tests for ms in test.times_ms]
-    registrations = [test.registration_s for test in tests if test.registration_s is not None]
-    mean_s = float(np.mean(registrations)) if registrations else None
-    if not times_ms:
-        return None, None, mean_s
-    return times_ms, 1e3 / float(np.mean(times_ms)), mean_s

@@ -1,10 +1,10 @@
-"""What is run for the paper's tables."""
+"""What is run for the paper's tables, and for the ablation."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Any, cast
+from typing import Any
 
-from navapp.evaluation.following import Answers, follow
+from navapp.evaluation.methods import METHODS
 from navapp.evaluation.paper.cases import (
     ALL_CASES,
     SITUATIONS,
@@ -14,7 +14,6 @@ from navapp.evaluation.paper.cases import (
     list_tests,
 )
 from navapp.evaluation.sequence import KnownSequence
-from navapp.tracking import Method
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,7 +21,7 @@ class TableSettings:
     """What is run; another campaign in the same folder must have the same."""
 
     cases: tuple[Case, ...]
-    methods: tuple[Method, ...]
+    methods: tuple[str, ...]  # `methods.find_method`
     n_tests: int  # of each case
     # of each test, after the one that is registered in; at least `SWEEP_FRAMES` of those with an
     # instrument, unless it is a quick look.
@@ -65,20 +64,17 @@ class TableSettings:
         """The first of each case; none for a quick look, whose times are those of its tests."""
         return () if self.is_quick else self.tests[:: self.n_tests]
 
-    def group(self, tests: Sequence[CaseTest]) -> list[tuple[CaseTest, ...]]:
-        """Each has pictures of its own."""
-        return [(test,) for test in tests]
+    @property
+    def has_details(self) -> bool:
+        """The tables show worst frames and the noise limit; the ablation does not."""
+        return set(self.methods) <= set(METHODS)
 
-    def count_frames(self, test: CaseTest) -> int:
+    def render(self, test: CaseTest, n_frames: int | None = None) -> KnownSequence:
+        """The pictures of a test: so many, or its own number, after the first one."""
+        return test.render(1 + (self._count_frames(test) if n_frames is None else n_frames))
+
+    def _count_frames(self, test: CaseTest) -> int:
         """A test with an instrument lasts until that has passed once."""
         has_instrument = SITUATIONS[test.case.situation].instrument != "none"
         is_whole = has_instrument and not self.is_quick
         return max(self.n_frames, SWEEP_FRAMES) if is_whole else self.n_frames
-
-    def render(self, test: CaseTest, n_frames: int) -> KnownSequence:
-        """The pictures of a test, and one before them."""
-        return test.render(n_frames + 1)
-
-    def follow(self, sequence: KnownSequence, method: str) -> Answers:
-        """What one of the methods says of a sequence."""
-        return follow(sequence, cast("Method", method))

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 
 from navapp.evaluation.campaign import Done
+from navapp.evaluation.methods import OURS
 from navapp.evaluation.paper.cases import SITUATIONS, STAGE_NAMES, CaseTest, SituationName
-from navapp.evaluation.paper.rows import WRONG_MM
 from navapp.evaluation.peers.scores import PeerFrame, PeerTest
+from navapp.evaluation.scores import WRONG_MM
 
 _OK, _EVERY = "bimcc, OK frames", "bimcc, every pose"
 
@@ -74,14 +75,12 @@ def _select(name: str, tests: Sequence[_Frames]) -> list[tuple[PeerFrame, ...]]:
 
 def _take_ours(done: Done[CaseTest]) -> dict[str, tuple[PeerFrame, ...]]:
     """Ours twice: with a pose only where the judge says OK, and with every pose."""
-    followed = done.followed.get("bimcc")
+    followed = done.followed.get(OURS)
     if followed is None:
         return {}
-    ok = tuple(
-        PeerFrame(one.index, one.tre_mm if one.is_ok else None, one.total_ms)
-        for one in followed.frames
-    )
-    every = tuple(PeerFrame(one.index, one.tre_mm, one.total_ms) for one in followed.frames)
+    frames = [(one, one.total_ms if one.was_followed else None) for one in followed.frames]
+    ok = tuple(PeerFrame(one.index, one.tre_mm if one.is_ok else None, ms) for one, ms in frames)
+    every = tuple(PeerFrame(one.index, one.tre_mm, ms) for one, ms in frames)
     return {_OK: ok, _EVERY: every}
 
 

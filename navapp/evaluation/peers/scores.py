@@ -1,10 +1,10 @@
 """Results of other people's trackers, and the files that keep them."""
 
-import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+
+from pydantic import TypeAdapter
 
 from navapp.errors import InputError
 from navapp.evaluation.paper.cases import CaseTest
@@ -28,6 +28,20 @@ class PeerTest:
 
     test: CaseTest
     frames: Mapping[str, tuple[PeerFrame, ...]]
+    code: str  # of the peers, their settings and libraries (`tests.bench.peer_frames`)
+
+
+@dataclass(frozen=True, slots=True)
+class _PeerFile:
+    """What is kept of a test."""
+
+    test: str
+    seed: int
+    code: str
+    peers: Mapping[str, tuple[PeerFrame, ...]]
+
+
+_PEER_FILE = TypeAdapter(_PeerFile)
 
 
 def file_of(folder: Path, test: CaseTest) -> Path:
@@ -39,12 +53,8 @@ def write_peers(folder: Path, done: PeerTest) -> None:
     """Keep the results of a test; the file appears when it is whole."""
     path = file_of(folder, done.test)
     path.parent.mkdir(exist_ok=True)
-    content: dict[str, Any] = {
-        "test": done.test.name,
-        "seed": done.test.seed,
-        "peers": {name: [asdict(one) for one in frames] for name, frames in done.frames.items()},
-    }
-    write_whole(path, (json.dumps(content, allow_nan=False) + "\n").encode())
+    kept = _PeerFile(done.test.name, done.test.seed, done.code, done.frames)
+    write_whole(path, _PEER_FILE.dump_json(kept) + b"\n")
 
 
 def read_peers(folder: Path, tests: Sequence[CaseTest]) -> list[PeerTest]:
@@ -59,13 +69,9 @@ def read_peers(folder: Path, tests: Sequence[CaseTest]) -> list[PeerTest]:
 def _read(folder: Path, test: CaseTest) -> PeerTest:
     path = file_of(folder, test)
     try:
-        peers = json.loads(path.read_text(encoding="utf-8"))["peers"]
-        frames = {
-            name: tuple(PeerFrame(one["index"], one["tre_mm"], one["ms"]) for one in kept)
-            for name, kept in peers.items()
-        }
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+        kept = _PEER_FILE.validate_json(path.read_bytes())
+    except ValueError as error:
         raise InputError(
             f"{path} is damaged", subject=str(path), remedy="delete it, and run again"
         ) from error
-    return PeerTest(test, frames)
+    return PeerTest(test, kept.peers, kept.code)

@@ -1,41 +1,45 @@
 """Writes what came of recordings: tables, one page with charts, and every frame as CSV."""
 
-import base64
-import csv
-import io
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from html import escape
 from pathlib import Path
 from typing import Any
 
 from calibration.report.page import make_html, make_note
 from navapp.errors import InputError, UsageError
-from navapp.evaluation.paper.report import render_markdown
-from navapp.evaluation.paper.tables import format_mm
 from navapp.evaluation.provenance import describe_origin
 from navapp.evaluation.recording.charts import draw_errors_beside_bounds, draw_errors_over_frames
 from navapp.evaluation.recording.rows import RecordingRow, make_rows
 from navapp.evaluation.recording.study import Studied
 from navapp.evaluation.recording.truth import describe_truth, truth_to_json
+from navapp.evaluation.recording.truth_files import DivotTruth
+from navapp.evaluation.report_parts import (
+    format_mm,
+    format_number,
+    format_share,
+    format_table,
+    make_figure,
+    make_frames_csv,
+    render_markdown,
+)
+from navapp.evaluation.scores import FrameScore
 from navapp.geometry.whole_files import write_whole
 
 FILES = ("tables.md", "report.html", "frames.csv", "evaluate.json")
-_COLUMNS = (
-    "index", "status", "tre_mm", "displacement_mm", "outline_mm", "bound_mm", "seen", "hidden",
-    "total_ms", "is_search",
-)  # fmt: skip
 _HEAD = (
-    "| recording | method | frames | with truth | OK | error mm: mean | median | 95 % | largest "
-    "| overlay mm | outline mm | within the bound | OK and wrong | fps |"
-)
+    "recording", "method", "frames", "with truth", "OK", "error mm: mean", "median", "95 %",
+    "largest", "overlay mm", "outline mm", "within the bound", "OK and wrong", "fps",
+)  # fmt: skip
+_VERDICTS = "recording", "method", "verdict", "at most 1 mm", "more than 1 mm", "no pose"
 _ABOUT = (
     "Errors: mean over the stage's targets (without any, over the bone's visible vertices), or "
     "over the touched points. Those of `bimcc` are of frames that its judge calls OK; `icp` and "
     "`paper`, carried on whatever our judge says, are measured in every frame with a pose. The "
     "first frame, which is registered in, is not counted. OK and wrong: more than 1 mm off, and "
-    "more than the predicted bound. fps: one over the mean time of a frame. Frames of one "
-    "recording are much alike: their number is no number of independent trials.\n"
+    "more than the predicted bound; at touched points, to which the bound does not apply, more "
+    "than 1 mm off. fps: one over the mean time of a frame in which the bone was followed. Frames "
+    "of one recording are much alike: their number is no number of independent trials.\n"
 )
 
 
@@ -73,6 +77,7 @@ def write_report(folder: Path, studied: Sequence[Studied]) -> dict[str, Any]:
     write_whole(folder / "report.html", _make_page(tables, studied).encode())
     write_whole(folder / "frames.csv", _make_csv(studied).encode())
     return {
+        "origin": describe_origin(),
         "rows": [row.to_json() for row in rows],
         "summary": {"recordings": {one.name: {"truth": truth_to_json(one)} for one in studied}},
     }
@@ -87,17 +92,13 @@ def _make_tables(studied: Sequence[Studied], rows: Sequence[RecordingRow]) -> st
         "## Errors",
         "",
         _ABOUT,
-        _HEAD,
-        "|---" * 14 + "|",
-        *(_format_row(row) for row in rows),
+        *format_table(_HEAD, (_format_row(row) for row in rows)),
         "",
         "## Verdicts",
         "",
         "Frames with a known truth, by the judge's word and by their error.",
         "",
-        "| recording | method | verdict | at most 1 mm | more than 1 mm | no pose |",
-        "|---|---|---|---|---|---|",
-        *(line for row in rows for line in _format_verdicts(row)),
+        *format_table(_VERDICTS, (cells for row in rows for cells in _format_verdicts(row))),
         "",
         "## The truth",
         "",
@@ -107,26 +108,27 @@ def _make_tables(studied: Sequence[Studied], rows: Sequence[RecordingRow]) -> st
     return "\n".join(parts)
 
 
-def _format_row(row: RecordingRow) -> str:
-    covered = "-" if row.coverage is None else f"{100.0 * row.coverage:.0f} %"
-    fps = "-" if row.fps is None else f"{row.fps:.0f}"
-    cells = [
-        _escape(row.name), f"`{row.method}`", str(row.n_frames), str(row.n_known), str(row.n_ok),
-        *(format_mm(value) for value in (
-            row.tre_mm, *(row.percentile_mm(q) for q in (50, 95, 100)),
-            row.overlay_mm, row.outline_mm,
-        )),
-        covered, str(row.n_wrong), fps,
-    ]  # fmt: skip
-    return "| " + " | ".join(cells) + " |"
+def _format_row(row: RecordingRow) -> tuple[str, ...]:
+    counted = row.counted
+    lengths_mm = (
+        counted.mean_mm, *(counted.percentile_mm(q) for q in (50, 95, 100)),
+        counted.mean_displacement_mm, counted.mean_outline_mm,
+    )  # fmt: skip
+    return (
+        _escape(row.name), f"`{row.method}`", str(row.figures.n_frames), str(row.known.n_frames),
+        str(row.figures.n_ok), *(format_mm(value) for value in lengths_mm),
+        format_share(row.coverage), str(row.n_wrong), format_number(row.fps),
+    )  # fmt: skip
 
 
-def _format_verdicts(row: RecordingRow) -> list[str]:
+def _format_verdicts(row: RecordingRow) -> list[tuple[str, ...]]:
     return [
-        f"| {_escape(row.name)} | `{row.method}` | {status} | {one.n_near} | {one.n_far} | "
-        f"{one.n_without_pose} |"
+        (
+            _escape(row.name), f"`{row.method}`", status, str(one.n_near), str(one.n_far),
+            str(one.n_without_pose),
+        )
         for status, one in row.verdicts.items()
-    ]
+    ]  # fmt: skip
 
 
 def _escape(name: str) -> str:
@@ -139,9 +141,10 @@ def _make_page(tables: str, studied: Sequence[Studied]) -> str:
         name = escape(one.name)
         parts += [f"<h2>{name}: error over the pictures</h2>"]
         parts += [make_note("The line is at 1 mm."), draw_errors_over_frames(one)]
-        parts += [f"<h2>{name}: error against bound, and against what is hidden</h2>"]
-        parts += [make_note("Above the line an error is larger than its predicted bound.")]
-        parts += [draw_errors_beside_bounds(one, one.leading)]
+        if not isinstance(one.truth, DivotTruth):
+            parts += [f"<h2>{name}: error against bound, and against what is hidden</h2>"]
+            parts += [make_note("Above the line an error is larger than its predicted bound.")]
+            parts += [draw_errors_beside_bounds(one, one.leading)]
         parts += [f"<h2>{name}: worst frames</h2>", *_show_worst(one)]
     return make_html("Evaluation on recordings", parts)
 
@@ -154,23 +157,16 @@ def _show_worst(one: Studied) -> list[str]:
         )
     ]
     for frame, picture in one.pictures:
-        data = base64.b64encode(picture).decode("ascii")
         told = f"picture {frame.index}, {frame.status}: {format_mm(frame.tre_mm)} mm"
-        parts.append(
-            f'<figure style="display:inline-block;margin:.5em"><img alt="{told}" '
-            f'src="data:image/jpeg;base64,{data}"><figcaption>{told}</figcaption></figure>'
-        )
+        parts.append(make_figure(picture, told))
     return parts
 
 
 def _make_csv(studied: Sequence[Studied]) -> str:
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(("recording", "method", *_COLUMNS, "has_truth", "reasons"))
-    for one in studied:
-        for method, answers in one.answers.items():
-            for frame in answers.followed.frames:
-                values = (getattr(frame, name) for name in _COLUMNS)
-                is_known = frame.index in one.known
-                writer.writerow((one.name, method, *values, is_known, "; ".join(frame.reasons)))
-    return out.getvalue()
+    def list_frames() -> Iterator[tuple[Sequence[object], FrameScore]]:
+        for one in studied:
+            for method, followed in one.followed.items():
+                for frame in followed.frames:
+                    yield (one.name, method, frame.index in one.known), frame
+
+    return make_frames_csv(("recording", "method", "has_truth"), list_frames())

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from navapp.evaluation.paper.rows import WRONG_MM, is_within_bound, is_wrong
+from navapp.evaluation.frame_figures import FrameFigures, find_mean
+from navapp.evaluation.paper.rows import count_errors
 from navapp.evaluation.recording.study import Studied
 from navapp.evaluation.recording.truth_files import DivotTruth
 from navapp.evaluation.scores import Followed, FrameScore
@@ -23,60 +24,63 @@ class VerdictCount:
     n_without_pose: int
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class RecordingRow:
     """Of one recording and one method."""
 
     name: str  # of the recording
     stage: str
     method: Method
-    n_frames: int  # after the one that is registered in
-    n_known: int  # of them, with a known truth
-    n_ok: int  # of all frames
-    n_wrong: int  # OK, more than `WRONG_MM` off and beyond their bound
-    # of OK frames with an error, the share within their bound; None for touched points, which are
-    # no targets of the stage and carry errors of their own.
-    coverage: float | None
-    # Of OK frames for ours, of all with a pose for the paper's two methods, as in `rows.Row`; mm.
-    errors_mm: tuple[float, ...]
-    overlay_mm: float | None  # means
-    outline_mm: float | None
-    tre_refused_mm: float | None  # mean of poses that the judge refuses
-    verdicts: dict[str, VerdictCount]
-    times_ms: tuple[float, ...]  # of frames without a search
+    figures: FrameFigures  # of all frames after the one that is registered in
+    known: FrameFigures  # of them, those with a known truth
+    # whose errors count: of ours OK frames, of the paper's two methods all with a pose.
+    counted: FrameFigures
+    # The truth is touched points: these are no targets of the stage and carry errors of their own,
+    # so that nothing is said of the bound.
+    is_touched: bool
     registration_s: float | None
+    times_ms: tuple[float, ...]  # of frames in which a bone was followed
 
     @property
-    def tre_mm(self) -> float | None:
-        """Mean error."""
-        return _mean(self.errors_mm)
+    def verdicts(self) -> dict[str, VerdictCount]:
+        """Of frames with a known truth, by the judge's word."""
+        return {status.value: _count(self.known.frames, status) for status in Status}
 
-    def percentile_mm(self, share: float) -> float | None:
-        """Of the errors."""
-        return float(np.percentile(self.errors_mm, share)) if self.errors_mm else None
+    @property
+    def n_wrong(self) -> int:
+        """OK, more than `WRONG_MM` off and beyond their bound; of touched points: far off."""
+        if self.is_touched:
+            return sum(one.is_far for one in self.known.ok.frames)
+        return self.known.n_wrong
+
+    @property
+    def coverage(self) -> float | None:
+        """Of OK frames with an error, the share within their bound."""
+        return None if self.is_touched else self.known.bound_coverage
 
     @property
     def fps(self) -> float | None:
         """One over the mean time of a frame."""
-        return 1e3 / float(np.mean(self.times_ms)) if self.times_ms else None
+        mean_ms = find_mean(self.times_ms)
+        return None if mean_ms is None else 1e3 / mean_ms
 
     def to_json(self) -> dict[str, Any]:
         """As in `evaluate.json`."""
-        times = {f"p{q}": float(np.percentile(self.times_ms, q)) for q in (50, 95) if self.times_ms}
+        times_ms, counted = self.times_ms, self.counted
         return {
             "sample": self.name,
             "stage": self.stage,
             "situation": "recording",
             "method": self.method,
-            "overlay_error_mm": self.overlay_mm,
-            "outline_error_mm": self.outline_mm,
-            "tre_mm": self.tre_mm,
-            "tre_percentiles_mm": {f"p{q}": self.percentile_mm(q) for q in (50, 95, 100)},
-            "tre_refused_mm": self.tre_refused_mm,
+            "overlay_error_mm": counted.mean_displacement_mm,
+            "outline_error_mm": counted.mean_outline_mm,
+            "tre_mm": counted.mean_mm,
+            "tre_percentiles_mm": {f"p{q}": counted.percentile_mm(q) for q in (50, 95, 100)},
+            "tre_refused_mm": self.known.refused.mean_mm,
             # Frames of one recording are too much alike for an interval.
             "ci95": {},
-            "ok_share": self.n_ok / max(self.n_frames, 1),
-            "refused": self.n_frames - self.n_ok,
+            "ok_share": self.figures.ok_share,
+            "refused": self.figures.n_frames - self.figures.n_ok,
             "wrong_and_ok": self.n_wrong,
             "bound_coverage": self.coverage,
             "verdicts": {
@@ -88,55 +92,38 @@ class RecordingRow:
                 for status, one in self.verdicts.items()
             },
             "fps": self.fps,
-            "latency_ms": times or {"p50": None, "p95": None},
+            "latency_ms": {
+                f"p{q}": float(np.percentile(times_ms, q)) if times_ms else None for q in (50, 95)
+            },
             "registration_s": self.registration_s,
             "tests": 1,
-            "frames": self.n_frames,
-            "frames_with_truth": self.n_known,
+            "frames": self.figures.n_frames,
+            "frames_with_truth": self.known.n_frames,
             "seeds": [],
         }
 
 
 def make_rows(studied: Studied) -> list[RecordingRow]:
     """One for each method."""
-    return [
-        _make_row(studied, method, answers.followed) for method, answers in studied.answers.items()
-    ]
+    return [_make_row(studied, method, followed) for method, followed in studied.followed.items()]
 
 
 def _make_row(studied: Studied, method: Method, followed: Followed) -> RecordingRow:
-    frames = followed.frames
-    known = [one for one in frames if one.index in studied.known]
-    measured = [one for one in known if one.tre_mm is not None]
-    ok = [one for one in measured if one.is_ok]
-    is_touched = isinstance(studied.truth, DivotTruth)
-    counted = ok if method == "bimcc" else measured
+    known = FrameFigures(tuple(one for one in followed.frames if one.index in studied.known))
     return RecordingRow(
         name=studied.name,
         stage=studied.stage,
         method=method,
-        n_frames=len(frames),
-        n_known=len(known),
-        n_ok=sum(one.is_ok for one in frames),
-        n_wrong=sum(is_wrong(one) for one in ok),
-        coverage=None if is_touched else _mean([float(is_within_bound(one)) for one in ok]),
-        errors_mm=tuple(one.tre_mm for one in counted if one.tre_mm is not None),
-        overlay_mm=_mean([one.displacement_mm for one in counted]),
-        outline_mm=_mean([one.outline_mm for one in counted]),
-        tre_refused_mm=_mean([one.tre_mm for one in measured if not one.is_ok]),
-        verdicts={status.value: _count(known, status) for status in Status},
-        times_ms=tuple(one.total_ms for one in frames if not one.is_search and one.total_ms > 0),
+        figures=FrameFigures(followed.frames),
+        known=known,
+        counted=count_errors(known, method),
+        is_touched=isinstance(studied.truth, DivotTruth),
         registration_s=followed.registration_s,
+        times_ms=tuple(followed.times_ms),
     )
 
 
 def _count(known: Sequence[FrameScore], status: Status) -> VerdictCount:
-    errors_mm = [one.tre_mm for one in known if one.status == status.value]
-    n_near = sum(error is not None and error <= WRONG_MM for error in errors_mm)
-    n_far = sum(error is not None and error > WRONG_MM for error in errors_mm)
-    return VerdictCount(n_near, n_far, len(errors_mm) - n_near - n_far)
-
-
-def _mean(values: Sequence[float | None]) -> float | None:
-    known = [value for value in values if value is not None]
-    return float(np.mean(known)) if known else None
+    some = [one for one in known if one.status == status.value]
+    n_far, n_posed = sum(one.is_far for one in some), sum(one.tre_mm is not None for one in some)
+    return VerdictCount(n_posed - n_far, n_far, len(some) - n_posed)

@@ -10,14 +10,14 @@ from drivers.replay_camera import open_source
 from navapp.config import Configuration
 from navapp.errors import RigError
 from navapp.evaluation.following import Answers, follow
-from navapp.evaluation.pose_errors import measure_pose
+from navapp.evaluation.methods import OURS
 from navapp.evaluation.recording.divots import measure_divots
 from navapp.evaluation.recording.other_tracker import SolvedFrames, find_poses, solve_frames
 from navapp.evaluation.recording.truth_files import DivotTruth, PoseTruth, Truth
-from navapp.evaluation.scores import FrameScore
+from navapp.evaluation.scores import Followed, FrameScore
+from navapp.evaluation.scoring import score_answers
 from navapp.evaluation.sequence import KnownSequence
 from navapp.evaluation.worst_frame import draw_frame
-from navapp.geometry.rectification import rectifier_of
 from navapp.geometry.rig import StereoRig
 from navapp.geometry.transform import RigidTransform
 from navapp.tracking import Method
@@ -133,7 +133,7 @@ class Studied:
     truth: Truth
     has_times: bool
     known: frozenset[int]  # pictures whose poses can be scored
-    answers: dict[Method, Answers]  # their scores have the pictures' own numbers
+    followed: dict[Method, Followed]  # their scores have the pictures' own numbers
     leading: Method  # ours, unless it was not asked for
     solved: SolvedFrames | None  # of another tracker, with the leading method's poses
     pictures: tuple[tuple[FrameScore, bytes], ...]  # its worst frames
@@ -148,7 +148,7 @@ def study(given: Study, methods: Sequence[Method]) -> Studied:
     """
     answers = {method: follow(given.to_sequence(), method) for method in methods}
     # Ours leads, because its judge tells which poses may be solved with.
-    leading: Method = "bimcc" if "bimcc" in answers else methods[0]
+    leading: Method = OURS if OURS in answers else methods[0]
     poses, solved = _find_truth(given, answers[leading])
     scored = {method: _score(given, one, poses) for method, one in answers.items()}
     return Studied(
@@ -161,7 +161,7 @@ def study(given: Study, methods: Sequence[Method]) -> Studied:
         {method: _number(one, given.frames.numbers) for method, one in scored.items()},
         leading,
         solved,
-        tuple(_draw_worst(given, scored[leading], poses)),
+        tuple(_draw_worst(given, answers[leading], scored[leading], poses)),
     )
 
 
@@ -175,8 +175,8 @@ def _find_truth(
     if isinstance(truth, PoseTruth):
         known = truth.poses[given.stage.bone]
         return [known.get(number) for number in frames.numbers], None
-    ok = {one.index for one in leading.followed.frames if one.is_ok}
-    believed = [pose if n in ok else None for n, pose in enumerate(leading.poses)]
+    # The first frame is the one that is registered in.
+    believed = [None, *(one.pose if one.is_ok else None for one in leading.frames[1:])]
     vertices_mm = given.plan.bones[given.stage.bone].mesh.vertices_mm
     solved = solve_frames(frames.times_ns, believed, truth, vertices_mm)
     return find_poses(solved, truth, frames.times_ns), solved
@@ -189,38 +189,26 @@ def _find_known(given: Study, true: Sequence[RigidTransform | None]) -> frozense
     return frozenset(number for number, pose in zip(numbers, true, strict=True) if pose)
 
 
-def _score(given: Study, answers: Answers, true: Sequence[RigidTransform | None]) -> Answers:
-    bone = given.plan.bones[given.stage.bone]
-    targets_mm = given.plan.targets_of(given.stage.targets)
-    geometry = rectifier_of(given.rig).geometry
-    touched_mm: Sequence[float | None] = [None] * len(true)
-    if isinstance(given.truth, DivotTruth):
-        touched_mm = measure_divots(answers.poses, given.frames.numbers, given.truth)
-    frames = []
-    for frame in answers.followed.frames:
-        pose, known = answers.poses[frame.index], true[frame.index]
-        tre_mm, displacement_mm, outline_mm = touched_mm[frame.index], None, None
-        if pose is not None and known is not None:
-            tre_mm, displacement_mm, outline_mm = measure_pose(
-                pose, known, bone, targets_mm, answers.surface, geometry
-            )
-        frames.append(
-            replace(frame, tre_mm=tre_mm, displacement_mm=displacement_mm, outline_mm=outline_mm)
-        )
-    return replace(answers, followed=replace(answers.followed, frames=tuple(frames)))
+def _score(given: Study, answers: Answers, true: Sequence[RigidTransform | None]) -> Followed:
+    followed = score_answers(given.to_sequence(true), answers, has_budget=False)
+    if not isinstance(given.truth, DivotTruth):
+        return followed
+    touched_mm = measure_divots(answers.poses, given.frames.numbers, given.truth)
+    frames = (replace(one, tre_mm=touched_mm[one.index]) for one in followed.frames)
+    return replace(followed, frames=tuple(frames))
 
 
-def _number(answers: Answers, numbers: Sequence[int]) -> Answers:
+def _number(followed: Followed, numbers: Sequence[int]) -> Followed:
     """With the numbers of the pictures instead of their places."""
-    frames = tuple(replace(one, index=numbers[one.index]) for one in answers.followed.frames)
-    return replace(answers, followed=replace(answers.followed, frames=frames))
+    frames = tuple(replace(one, index=numbers[one.index]) for one in followed.frames)
+    return replace(followed, frames=frames)
 
 
 def _draw_worst(
-    given: Study, answers: Answers, true: Sequence[RigidTransform | None]
+    given: Study, answers: Answers, followed: Followed, true: Sequence[RigidTransform | None]
 ) -> Iterator[tuple[FrameScore, bytes]]:
     """The largest errors that the judge calls OK; of all poses when it calls none so."""
-    known = [one for one in answers.followed.frames if one.tre_mm is not None]
+    known = [one for one in followed.frames if one.tre_mm is not None]
     chosen = [one for one in known if one.is_ok] or known
     chosen.sort(key=lambda one: one.tre_mm or 0.0, reverse=True)
     sequence = given.to_sequence(true)

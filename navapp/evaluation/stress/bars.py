@@ -32,12 +32,13 @@ def check_blur(axes: Sequence[AxisRows]) -> list[Held]:
 
 
 def _list_missed(row: LevelRow) -> list[str]:
-    if row.tre_mm is None or row.worst_mm is None or row.coverage is None:
+    coverage = row.figures.bound_coverage
+    if row.tre_mm is None or row.worst_mm is None or coverage is None:
         return ["no frame is OK"]
     checks = {
         f"OK in {LEAST_OK_SHARE:.0%} of the frames": row.ok_share >= LEAST_OK_SHARE,
         f"TRE median {MOST_TRE_MM:g} mm": row.tre_mm <= MOST_TRE_MM,
         f"worst OK frame {MOST_WORST_MM:g} mm": row.worst_mm <= MOST_WORST_MM,
-        f"bound holds in {LEAST_COVERAGE:.0%}": row.coverage >= LEAST_COVERAGE,
+        f"bound holds in {LEAST_COVERAGE:.0%}": coverage >= LEAST_COVERAGE,
     }
     return [name for name, is_kept in checks.items() if not is_kept]

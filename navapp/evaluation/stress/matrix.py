@@ -1,20 +1,19 @@
 """The tests of the stress matrix: every level of every axis, on some knees each."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
-from itertools import count, groupby, islice
+from itertools import count, islice
 from typing import Any
 
 from navapp.config import Configuration
 from navapp.config.camera_sections import CameraSection, SimulationSection
 from navapp.devices.simulated_room import find_cartilage_mm
-from navapp.evaluation.following import Answers, follow
+from navapp.evaluation.methods import OURS
 from navapp.evaluation.sequence import KnownSequence, render_room
 from navapp.evaluation.stress.axes import AXES, Axis, find_seed, is_moving_fully
 from navapp.evaluation.stress.changes import BONE
 from navapp.geometry.transform import FloatArray
-from navapp.tracking import Method
 
 _STAGE = "opening"
 _SEXES: tuple[Any, ...] = ("male", "female")
@@ -85,7 +84,7 @@ class StressSettings:
     n_frames: int  # that count, of each knee, after the one that is registered in
     first_seed: int
     is_quick: bool = False
-    methods: tuple[Method, ...] = ("bimcc",)
+    methods: tuple[str, ...] = (OURS,)
 
     def to_json(self) -> dict[str, Any]:
         """Named values."""
@@ -98,7 +97,7 @@ class StressSettings:
 
     @property
     def tests(self) -> tuple[StressTest, ...]:
-        """All of them; those that may share their pictures stand beside each other."""
+        """All of them; those with the same pictures stand beside each other."""
         return tuple(self._list_tests())
 
     @property
@@ -106,21 +105,14 @@ class StressSettings:
         """None: nothing is said of times."""
         return ()
 
-    def group(self, tests: Sequence[StressTest]) -> list[tuple[StressTest, ...]]:
-        """One knee's levels of a rig or a plan are seen in the same pictures."""
-        return [tuple(some) for _, some in groupby(tests, key=StressTest.configure)]
+    @property
+    def has_details(self) -> bool:
+        """None are shown."""
+        return False
 
-    def count_frames(self, test: StressTest) -> int:
-        """The same of all."""
-        return self.n_frames
-
-    def render(self, test: StressTest, n_frames: int) -> KnownSequence:
-        """The pictures of a test."""
-        return test.render(n_frames)
-
-    def follow(self, sequence: KnownSequence, method: str) -> Answers:
-        """What our method says of a sequence."""
-        return follow(sequence, "bimcc")
+    def render(self, test: StressTest, n_frames: int | None = None) -> KnownSequence:
+        """The pictures of a test until so many have counted."""
+        return test.render(self.n_frames if n_frames is None else n_frames)
 
     def _list_tests(self) -> Iterator[StressTest]:
         for name in self.axes:

@@ -1,28 +1,23 @@
 """Writes what the stress matrix has found: tables, report, JSON and every frame as CSV."""
 
-import csv
-import io
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from calibration.report.page import make_html
 from calibration.report.plots import BLUE, ORANGE, draw_svg
 from navapp.evaluation.campaign import CampaignFolder, Done
-from navapp.evaluation.paper.report import render_markdown
-from navapp.evaluation.paper.summary import Judged, judge_method
+from navapp.evaluation.judge.figures import JudgeFigures, judge_method
+from navapp.evaluation.methods import OURS
 from navapp.evaluation.provenance import describe_origin
-from navapp.evaluation.scores import Followed
+from navapp.evaluation.report_parts import make_frames_csv, render_markdown
+from navapp.evaluation.scores import FrameScore
 from navapp.evaluation.stress.axes import AXES
 from navapp.evaluation.stress.bars import check_blur
 from navapp.evaluation.stress.matrix import StressSettings, StressTest
-from navapp.evaluation.stress.rows import AxisRows, list_counted, make_axis_rows
+from navapp.evaluation.stress.rows import AxisRows, make_axis_rows
 from navapp.evaluation.stress.tables import make_stress_tables
 from navapp.geometry.whole_files import write_whole
 
-_COLUMNS = (
-    "index", "status", "tre_mm", "bound_mm", "seen", "hidden", "total_ms", "is_search",
-)  # fmt: skip
 # What is further off would hide all else.
 _MOST_MM = 3.0
 
@@ -53,18 +48,16 @@ def write_stress(folder: CampaignFolder[StressTest], settings: StressSettings) -
     }
 
 
-def _judge(done: Sequence[Done[StressTest]]) -> Judged:
-    """Over all levels that pictures can show, and frames that count."""
-    shown = [
-        replace(one, followed={"bimcc": _only_counted(one)})
-        for one in done
-        if not one.test.axis.is_hidden(one.test.level)
-    ]
-    return judge_method("bimcc", shown)
-
-
-def _only_counted(done: Done[StressTest]) -> Followed:
-    return replace(done.followed["bimcc"], frames=tuple(list_counted(done)))
+def _judge(done: Sequence[Done[StressTest]]) -> JudgeFigures:
+    """All frames that were followed, at levels that pictures can show."""
+    return judge_method(
+        OURS,
+        (
+            (one.test.seed, one.followed[OURS].frames)
+            for one in done
+            if not one.test.axis.is_hidden(one.test.level)
+        ),
+    )
 
 
 def _about(settings: StressSettings, done: Sequence[Done[StressTest]]) -> list[str]:
@@ -113,16 +106,12 @@ def _draw(one: AxisRows) -> str:
 
 
 def _make_csv(done: Sequence[Done[StressTest]]) -> str:
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(("axis", "level", "knee", "seed", "counts", *_COLUMNS, "reasons"))
-    for one in done:
-        test = one.test
-        for frame in one.followed["bimcc"].frames:
-            values = (getattr(frame, name) for name in _COLUMNS)
-            counts = test.counts(frame.index)
-            writer.writerow(
-                (test.axis_name, f"{test.level:g}", test.knee, test.seed, counts, *values,
-                 "; ".join(frame.reasons))
-            )  # fmt: skip
-    return out.getvalue()
+    def list_frames() -> Iterator[tuple[Sequence[object], FrameScore]]:
+        for one in done:
+            test = one.test
+            for frame in one.followed[OURS].frames:
+                counts = test.counts(frame.index)
+                keys = test.axis_name, f"{test.level:g}", test.knee, test.seed, counts
+                yield keys, frame
+
+    return make_frames_csv(("axis", "level", "knee", "seed", "counts"), list_frames())

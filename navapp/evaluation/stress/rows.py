@@ -2,14 +2,13 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from navapp.evaluation.campaign import Done
-from navapp.evaluation.paper.rows import WRONG_MM, is_within_bound, is_wrong
-from navapp.evaluation.scores import FrameScore
+from navapp.evaluation.frame_figures import FrameFigures, pool_frames
+from navapp.evaluation.methods import OURS
+from navapp.evaluation.scores import WRONG_MM, FrameScore
 from navapp.evaluation.stress.axes import Axis
 from navapp.evaluation.stress.matrix import StressTest
 
@@ -17,32 +16,56 @@ from navapp.evaluation.stress.matrix import StressTest
 KEPT_SHARE, ENDED_SHARE = 0.9, 0.5
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class LevelRow:
-    """Of one level, over its knees; None where no frame has the figure."""
+    """Of one level, over its knees."""
 
     level: float
     n_knees: int
-    n_frames: int  # that count
-    n_ok: int
-    # Over OK frames, mm: middle and worst.
-    tre_mm: float | None
-    worst_mm: float | None
-    tre_any_mm: float | None  # median over all frames with a pose, whatever the judge says
-    n_wrong: int  # OK, further off than 1 mm and than their bound
-    coverage: float | None  # of OK frames, the share within their bound
+    figures: FrameFigures  # of frames that show what the level says
+    # of all frames that were followed, with those in which a leg that is moved to and fro turns
+    every: FrameFigures
     reason: str  # the one that is told most often of frames that are not OK; empty: none
     reason_share: float  # of those frames
     is_hidden: bool  # pictures cannot show this level
 
     @property
     def ok_share(self) -> float:
-        """Of all frames that count."""
-        return self.n_ok / max(self.n_frames, 1)
+        """Share of OK frames, of those that count."""
+        return self.figures.ok_share
+
+    @property
+    def tre_mm(self) -> float | None:
+        """Median of OK frames that count."""
+        return self.figures.ok.percentile_mm(50.0)
+
+    @property
+    def worst_mm(self) -> float | None:
+        """Largest error of all OK frames."""
+        return self.every.ok.worst_mm
+
+    @property
+    def tre_any_mm(self) -> float | None:
+        """Median of all frames that count and have a pose, whatever the judge says."""
+        return self.figures.percentile_mm(50.0)
 
     def to_json(self) -> dict[str, Any]:
         """Named values."""
-        return {**asdict(self), "ok_share": self.ok_share}
+        return {
+            "level": self.level,
+            "n_knees": self.n_knees,
+            "n_frames": self.figures.n_frames,
+            "n_ok": self.figures.n_ok,
+            "ok_share": self.ok_share,
+            "tre_mm": self.tre_mm,
+            "worst_mm": self.worst_mm,
+            "tre_any_mm": self.tre_any_mm,
+            "n_wrong": self.every.n_wrong,
+            "coverage": self.figures.bound_coverage,
+            "reason": self.reason,
+            "reason_share": self.reason_share,
+            "is_hidden": self.is_hidden,
+        }
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +78,12 @@ class AxisRows:
     @property
     def n_wrong(self) -> int:
         """OK and wrong, where pictures can show it."""
-        return sum(row.n_wrong for row in self.rows if not row.is_hidden)
+        return sum(row.every.n_wrong for row in self.rows if not row.is_hidden)
+
+    @property
+    def n_wrong_hidden(self) -> int:
+        """OK and wrong at levels that pictures cannot show."""
+        return sum(row.every.n_wrong for row in self.rows if row.is_hidden)
 
     def sides(self) -> Iterator[list[LevelRow]]:
         """The usual level and those beyond it, outwards: below it, then above."""
@@ -93,6 +121,7 @@ class AxisRows:
             "ok_ends_at": self.find_ends(),
             "one_mm_passed_at": self.find_passed(),
             "wrong_and_ok": self.n_wrong,
+            "wrong_and_ok_hidden": self.n_wrong_hidden,
             "levels": [row.to_json() for row in self.rows],
         }
 
@@ -106,27 +135,19 @@ def make_axis_rows(axis: Axis, done: Sequence[Done[StressTest]]) -> AxisRows:
 
 def list_counted(done: Done[StressTest]) -> list[FrameScore]:
     """Frames of a test that show what its level says."""
-    return [frame for frame in done.followed["bimcc"].frames if done.test.counts(frame.index)]
+    return [frame for frame in done.followed[OURS].frames if done.test.counts(frame.index)]
 
 
 def _make_row(axis: Axis, level: float, done: Sequence[Done[StressTest]]) -> LevelRow:
-    frames = [frame for one in done for frame in list_counted(one)]
-    ok = [frame for frame in frames if frame.is_ok and frame.tre_mm is not None]
-    errors_mm = [frame.tre_mm for frame in ok if frame.tre_mm is not None]
-    any_mm = [frame.tre_mm for frame in frames if frame.tre_mm is not None]
-    refused = [frame for frame in frames if not frame.is_ok]
+    figures = pool_frames(list_counted(one) for one in done)
+    refused = figures.refused.frames
     told = Counter(reason for frame in refused for reason in frame.reasons or ("no pose",))
     reason, n_told = told.most_common(1)[0] if told else ("", 0)
     return LevelRow(
         level=level,
         n_knees=len(done),
-        n_frames=len(frames),
-        n_ok=len(ok),
-        tre_mm=float(np.median(errors_mm)) if errors_mm else None,
-        worst_mm=max(errors_mm, default=None),
-        tre_any_mm=float(np.median(any_mm)) if any_mm else None,
-        n_wrong=sum(is_wrong(frame) for frame in ok),
-        coverage=float(np.mean([is_within_bound(frame) for frame in ok])) if ok else None,
+        figures=figures,
+        every=pool_frames(one.followed[OURS].frames for one in done),
         reason=reason,
         reason_share=n_told / max(len(refused), 1),
         is_hidden=axis.is_hidden(level),

@@ -2,7 +2,13 @@
 
 from collections.abc import Sequence
 
-from navapp.evaluation.paper.summary import Judged
+from navapp.evaluation.judge.figures import JudgeFigures
+from navapp.evaluation.report_parts import (
+    format_number,
+    format_share,
+    format_table,
+    make_quick_note,
+)
 from navapp.evaluation.stress.bars import check_blur
 from navapp.evaluation.stress.rows import ENDED_SHARE, KEPT_SHARE, AxisRows, LevelRow
 
@@ -11,20 +17,21 @@ _ABOUT = (
     "TRE: mean over the stage's targets, against where they really are. Median and worst are of "
     "frames that the judge calls OK; *any* is the median of all frames with a pose. OK and wrong: "
     "OK, more than 1 mm off and more than the predicted bound. Within: share of OK frames within "
-    "their bound. Where the leg is moved, only frames at nine tenths of its speed or more count.\n"
+    "their bound. Where the leg is moved to and fro, shares and medians are of frames at nine "
+    "tenths of its speed or more; the worst one, and OK and wrong, are of all.\n"
 )
 _CAUSES = (
     "Pictures cannot show these: the pose is wrong and everything agrees. OK and wrong frames are "
     'expected here at levels marked *hidden*; they are not counted under "OK and wrong".\n'
 )
 _HEAD = (
-    "| {} | OK | TRE median, mm | worst OK, mm | any, mm | OK and wrong | within "
-    "| most frequent reason of the others |"
-)
+    "OK", "TRE median, mm", "worst OK, mm", "any, mm", "OK and wrong", "within",
+    "most frequent reason of the others",
+)  # fmt: skip
 
 
 def make_stress_tables(
-    axes: Sequence[AxisRows], judged: Judged, about: Sequence[str], *, is_quick: bool
+    axes: Sequence[AxisRows], judged: JudgeFigures, about: Sequence[str], *, is_quick: bool
 ) -> str:
     """The whole of `stress.md`.
 
@@ -36,7 +43,7 @@ def make_stress_tables(
     """
     parts = ["# Stress matrix on simulated knees", ""]
     if is_quick:
-        parts += ["**A quick look: one knee and 3 frames a level. These are no results.**", ""]
+        parts += make_quick_note("one knee and 3 frames a level")
     parts += [*(f"- {line}" for line in about), "", _ABOUT]
     causes = [one for one in axes if one.axis.is_cause]
     others = [one for one in axes if not one.axis.is_cause]
@@ -51,84 +58,90 @@ def make_stress_tables(
 
 
 def _format_causes(causes: Sequence[AxisRows]) -> list[str]:
-    lines = [
-        "| cause | median TRE of any pose, mm, at its level | 1 mm is passed at "
-        f"| OK in fewer than {ENDED_SHARE:.0%} from | what finds it |",
-        "|---|---|---|---|---|",
-    ]
-    for one in causes:
-        errors = "; ".join(f"{_mm(row.tre_any_mm)} at {row.level:g}" for row in one.rows)
-        passed, ends = (_join(levels, one) for levels in (one.find_passed(), one.find_ends()))
-        title = ", ".join(part for part in (one.axis.title, one.axis.unit) if part)
-        lines.append(f"| {title} | {errors} | {passed} | {ends} | {one.axis.found_by} |")
-    return lines
+    head = (
+        "cause", "median TRE of any pose, mm, at its level", "1 mm is passed at",
+        f"OK in fewer than {ENDED_SHARE:.0%} from", "what finds it",
+    )  # fmt: skip
+    return format_table(head, (_format_cause(one) for one in causes))
+
+
+def _format_cause(one: AxisRows) -> tuple[str, ...]:
+    errors = "; ".join(f"{_mm(row.tre_any_mm)} at {row.level:g}" for row in one.rows)
+    passed, ends = (_join(levels, one) for levels in (one.find_passed(), one.find_ends()))
+    title = ", ".join(part for part in (one.axis.title, one.axis.unit) if part)
+    return title, errors, passed, ends, one.axis.found_by
 
 
 def _format_ends(others: Sequence[AxisRows]) -> list[str]:
-    lines = [
-        f"| axis | usual | OK in {KEPT_SHARE:.0%} of frames up to | in fewer than "
-        f"{ENDED_SHARE:.0%} from | reason there | OK and wrong |",
-        "|---|---|---|---|---|---|",
-    ]
-    for one in others:
-        ends = one.find_ends()
-        reasons = [row.reason for row in one.rows if row.level in ends and row.reason]
-        lines.append(
-            f"| {one.axis.title} | {_with_unit(one.axis.usual, one)} | "
-            f"{_join(one.find_kept(), one)} | {_join(ends, one)} | "
-            f"{'; '.join(dict.fromkeys(reasons)) or '-'} | {one.n_wrong} |"
-        )
-    return lines
+    head = (
+        "axis", "usual", f"OK in {KEPT_SHARE:.0%} of frames up to",
+        f"in fewer than {ENDED_SHARE:.0%} from", "reason there", "OK and wrong",
+    )  # fmt: skip
+    return format_table(head, (_format_end(one) for one in others))
 
 
-def _format_wrong(axes: Sequence[AxisRows], judged: Judged) -> list[str]:
-    by_frames, by_knees = judged.wrong_at_most
+def _format_end(one: AxisRows) -> tuple[str, ...]:
+    ends = one.find_ends()
+    reasons = [row.reason for row in one.rows if row.level in ends and row.reason]
+    return (
+        one.axis.title, _with_unit(one.axis.usual, one), _join(one.find_kept(), one),
+        _join(ends, one), "; ".join(dict.fromkeys(reasons)) or "-", str(one.n_wrong),
+    )  # fmt: skip
+
+
+def _format_wrong(axes: Sequence[AxisRows], judged: JudgeFigures) -> list[str]:
+    figures, (by_frames, by_knees) = judged.figures, judged.wrong_at_most
     lines = [
-        f"Over all levels that pictures can show: {judged.n_wrong} of {judged.n_ok} OK frames, of "
-        f"{judged.n_frames}, are wrong; in {judged.n_wrong_knees} of {judged.n_knees} knees. "
+        f"Over all levels that pictures can show: {figures.n_wrong} of {figures.n_ok} OK frames, "
+        f"of {figures.n_frames}, are wrong; in {judged.n_wrong_knees} of {judged.n_knees} knees. "
         f"At most {100.0 * by_frames:.3f} % of OK frames and {100.0 * by_knees:.1f} % of knees "
-        "(95 %, one-sided; frames of one knee are alike)."
+        "(95 %, one-sided; frames of one knee are alike).",
+        "",
     ]
     for one in axes:
-        levels = [row.level for row in one.rows if row.n_wrong and not row.is_hidden]
+        levels = [row.level for row in one.rows if row.every.n_wrong and not row.is_hidden]
         if levels:
-            lines += ["", f"- {one.axis.title}: {one.n_wrong}, at {_join(levels, one)}; "
-                          f"found by {one.axis.found_by}"]  # fmt: skip
-    return lines
+            lines.append(
+                f"- {one.axis.title}: {one.n_wrong}, at {_join(levels, one)}; "
+                f"found by {one.axis.found_by}"
+            )
+    hidden = {one.axis.name: one.n_wrong_hidden for one in axes if one.n_wrong_hidden}
+    told = ", ".join(f"{name} {n}" for name, n in hidden.items()) or "none"
+    return [*lines, f"- at levels that pictures cannot show, not counted above: {told}"]
 
 
 def _format_blur(axes: Sequence[AxisRows]) -> list[str]:
     held = check_blur(axes)
     if not held:
         return []
-    lines = [
-        "## Motion blur, rolling shutter, shake",
-        "",
-        "| | OK | TRE median, mm | worst OK, mm | within | misses |",
-        "|---|---|---|---|---|---|",
-    ]
-    for one in held:
-        row = one.row
-        lines.append(
-            f"| {one.title} | {row.ok_share:.0%} | {_mm(row.tre_mm)} | {_mm(row.worst_mm)} | "
-            f"{_share(row.coverage)} | {', '.join(one.missed) or 'nothing'} |"
-        )
-    return [*lines, ""]
+    head = "", "OK", "TRE median, mm", "worst OK, mm", "within", "misses"
+    cells = (
+        (one.title, *_format_errors(one.row), ", ".join(one.missed) or "nothing") for one in held
+    )
+    return ["## Motion blur, rolling shutter, shake", "", *format_table(head, cells), ""]
+
+
+def _format_errors(row: LevelRow) -> tuple[str, ...]:
+    return (
+        format_share(row.ok_share), _mm(row.tre_mm), _mm(row.worst_mm),
+        format_share(row.figures.bound_coverage),
+    )  # fmt: skip
 
 
 def _format_axis(one: AxisRows) -> list[str]:
     unit = f"level, {one.axis.unit}" if one.axis.unit else "level"
-    lines = [f"### {one.axis.title}", "", _HEAD.format(unit), "|---" * 8 + "|"]
-    return [*lines, *(_format_level(row, one.axis.usual) for row in one.rows), ""]
+    cells = (_format_level(row, one.axis.usual) for row in one.rows)
+    return [f"### {one.axis.title}", "", *format_table((unit, *_HEAD), cells), ""]
 
 
-def _format_level(row: LevelRow, usual: float) -> str:
-    told = f"{row.reason} ({row.reason_share:.0%})" if row.reason else "-"
+def _format_level(row: LevelRow, usual: float) -> tuple[str, ...]:
+    told = f"{row.reason} ({format_share(row.reason_share)})" if row.reason else "-"
     mark = " (usual)" if row.level == usual else " (hidden)" if row.is_hidden else ""
+    ok_share, tre_mm, worst_mm, within = _format_errors(row)
     return (
-        f"| {row.level:g}{mark} | {row.ok_share:.0%} | {_mm(row.tre_mm)} | {_mm(row.worst_mm)} | "
-        f"{_mm(row.tre_any_mm)} | {row.n_wrong} | {_share(row.coverage)} | {told} |"
-    )
+        f"{row.level:g}{mark}", ok_share, tre_mm, worst_mm, _mm(row.tre_any_mm),
+        str(row.every.n_wrong), within, told,
+    )  # fmt: skip
 
 
 def _join(levels: Sequence[float | None], one: AxisRows) -> str:
@@ -143,8 +156,4 @@ def _with_unit(level: float, one: AxisRows) -> str:
 
 
 def _mm(value: float | None) -> str:
-    return "-" if value is None else f"{value:.2f}"
-
-
-def _share(value: float | None) -> str:
-    return "-" if value is None else f"{value:.0%}"
+    return format_number(value, 2)

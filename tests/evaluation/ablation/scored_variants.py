@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
-from navapp.evaluation.ablation.settings import VARIANTS
 from navapp.evaluation.campaign import Done
+from navapp.evaluation.methods import VARIANTS
 from navapp.evaluation.paper.cases import Case, list_tests
 from navapp.evaluation.scores import Followed
 

@@ -4,7 +4,7 @@ import re
 
 from navapp.evaluation.ablation.chart import draw_variants
 from navapp.evaluation.ablation.rows import ALL, make_variant_rows
-from navapp.evaluation.ablation.settings import VARIANTS
+from navapp.evaluation.methods import VARIANTS
 from navapp.evaluation.paper.cases import Case
 from tests.evaluation.ablation.scored_variants import done_by_variants
 from tests.evaluation.scored import followed, score

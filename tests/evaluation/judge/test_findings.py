@@ -5,7 +5,7 @@ import json
 import pytest
 
 from navapp.evaluation.judge.findings import examine_judge
-from navapp.evaluation.paper.report import render_markdown
+from navapp.evaluation.report_parts import render_markdown
 from navapp.evaluation.scores import ErrorBudget
 from tests.evaluation.scored import score
 

@@ -5,8 +5,8 @@ import json
 import pytest
 
 from navapp.evaluation.noise_limit.summary import compare_with_limit
-from navapp.evaluation.scores import ErrorBudget, Followed
-from tests.evaluation.scored import followed, score
+from navapp.evaluation.scores import ErrorBudget
+from tests.evaluation.scored import score
 
 
 def frame(limit, ideal, matched, reached, status="OK"):
@@ -43,8 +43,3 @@ def test_the_step_that_adds_most_is_told_where_the_efficiency_is_low(budget, lar
     assert one.largest_step == largest
     assert sum(one.added_mm2.values()) == pytest.approx(budget[3] ** 2 - budget[0] ** 2)
     json.dumps(one.to_json(), allow_nan=False)
-
-
-def test_a_budget_goes_through_json() -> None:
-    one = followed(frame(0.01, 0.02, 0.03, 0.04), score(0.1, claimed_mm=(0.1, 0.2, 0.3, 0.4)))
-    assert Followed.from_json(json.loads(json.dumps(one.to_json()))) == one

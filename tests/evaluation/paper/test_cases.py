@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from navapp.evaluation.ablation.settings import FIRST_ABLATION_SEED
+from navapp.control.stages import STAGES
 from navapp.evaluation.paper.cases import (
     ALL_CASES,
+    FIRST_ABLATION_SEED,
     FIRST_SEED,
     INSTRUMENT_S,
     MOST_TESTS,
@@ -20,7 +21,10 @@ from navapp.evaluation.paper.cases import (
     list_tests,
 )
 from navapp.evaluation.stress.axes import AXES, FIRST_STRESS_SEED, MOST_KNEES
-from sim_devices.motion import SWEEP_PERIOD_S, compute_sweep_offset_mm
+from sim_devices.motion import SWEEP_PERIOD_S
+from sim_devices.scenario import Scenario
+from sim_devices.world import World
+from tests.sim_devices.test_world import mask_of
 
 ROOT = Path(__file__).parents[3]
 SEEDS = range(FIRST_SEED, FIRST_SEED + len(ALL_CASES) * MOST_TESTS)
@@ -106,15 +110,22 @@ def test_a_test_configures_its_knee_and_its_situation() -> None:
     assert tests["man-drilling-overlay-0"].configure().camera.simulated.instrument == "none"
 
 
-def test_the_instrument_lies_before_the_bone_when_it_is_said_to() -> None:
-    def aside_mm(time_s: float) -> float:
-        return float(np.linalg.norm(compute_sweep_offset_mm("sweep", time_s)))
+@pytest.mark.parametrize("stage", STAGES, ids=lambda stage: stage.name)
+def test_the_instrument_hides_the_bone_of_every_stage_when_it_is_said_to(stage) -> None:
+    scenario = Scenario(seed=3, side="left", stage=stage.name, instrument="sweep", motion="still")
+    world = World(scenario)
+
+    def count_seen(time_s: float) -> int:
+        seen = world.depth("left", round(1e9 * time_s), 0.25)
+        return int(mask_of(seen, stage.bone).sum())
 
     first_s, last_s = INSTRUMENT_S
-    # A knee's half width and a hand's are together some 70 mm.
-    assert all(aside_mm(time_s) < 75.0 for time_s in np.arange(first_s, last_s, 0.05))
-    assert aside_mm(first_s - 0.2) > 75.0
-    assert aside_mm(last_s + 0.2) > 75.0
+    free = count_seen(0.0)
+    assert free > 100
+    assert count_seen(first_s) == count_seen(last_s) == free
+    middle = [count_seen(time_s) for time_s in np.arange(first_s + 0.4, last_s - 0.4, 0.35)]
+    assert min(middle) < 0.8 * free
+    assert max(middle) < free, "all that time"
     assert SWEEP_PERIOD_S == 6.0
 
 

@@ -5,7 +5,7 @@ import json
 
 import pytest
 
-from navapp.evaluation.campaign import CampaignFolder
+from navapp.evaluation.campaign import CampaignFolder, Done
 from navapp.evaluation.paper.cases import Case
 from navapp.evaluation.paper.results import write_results
 from navapp.evaluation.paper.settings import TableSettings
@@ -27,10 +27,8 @@ def written(tmp_path_factory):
     settings = TableSettings(cases, ("icp", "bimcc"), 1, 2, 7)
     folder = CampaignFolder(tmp_path_factory.mktemp("results") / "out", settings)
     for test in settings.tests:
-        methods = {"icp": THEIRS.to_json(), "bimcc": OURS.to_json()}
-        content = json.dumps({"methods": methods})
         for is_timed in (False, True):
-            folder.file_of(test, is_timed=is_timed).write_text(content)
+            folder.write(Done(test, {"icp": THEIRS, "bimcc": OURS}), is_timed=is_timed)
     return folder.path, write_results(folder, settings)
 
 

@@ -3,11 +3,12 @@
 import pytest
 from scipy.stats import beta
 
-from navapp.evaluation.paper.cases import ALL_CASES, METHODS, Case
+from navapp.evaluation.judge.figures import judge_method
+from navapp.evaluation.methods import METHODS
+from navapp.evaluation.paper.cases import ALL_CASES, Case
 from navapp.evaluation.paper.published import CONTRADICTIONS
 from navapp.evaluation.paper.rows import make_row
-from navapp.evaluation.paper.summary import judge_method
-from navapp.evaluation.paper.tables import format_mm, make_tables
+from navapp.evaluation.paper.tables import make_tables
 from tests.evaluation.scored import done, followed, score
 
 
@@ -16,7 +17,10 @@ def tables_of(tests, *, methods=METHODS, is_quick=False) -> str:
     for case in dict.fromkeys(one.test.case for one in tests):
         of_case = [one for one in tests if one.test.case == case]
         rows += [make_row(case, method, of_case, of_case) for method in methods]
-    judged = [judge_method(method, tests) for method in methods]
+    judged = [
+        judge_method(method, [(one.test.seed, one.followed[method].frames) for one in tests])
+        for method in methods
+    ]
     return make_tables(rows, judged, ["made here"], is_quick=is_quick)
 
 
@@ -109,7 +113,7 @@ def test_only_all_frames_are_a_hundred_percent(n_ok, n_all, told) -> None:
 
 def test_a_quick_look_says_that_it_is_none() -> None:
     tests = done(followed(score(0.1)))
-    assert "These are no results" in tables_of(tests, is_quick=True).replace("\n", " ")
+    assert "a trial, and no results" in tables_of(tests, is_quick=True).replace("\n", " ")
     assert "no results" not in tables_of(tests)
 
 
@@ -128,9 +132,3 @@ def test_words_that_must_be_there() -> None:
     for words in ("made here", "no formula", "its judge calls OK", "in every frame with a pose",
                   *CONTRADICTIONS):  # fmt: skip
         assert words in text, words
-
-
-def test_lengths_are_short_where_the_bone_is_lost() -> None:
-    assert [format_mm(value) for value in (None, 0.0, 0.0456, 9.9994, 10.0, 123.4)] == [
-        "-", "0.000", "0.046", "9.999", "10", "123",
-    ]  # fmt: skip

@@ -14,4 +14,5 @@ def peer_frames(
 
 def peer_test(test: CaseTest, **errors_mm: Sequence[float | None]) -> PeerTest:
     """One test, by the names of peers."""
-    return PeerTest(test, {name: peer_frames(one) for name, one in errors_mm.items()})
+    frames = {name: peer_frames(one) for name, one in errors_mm.items()}
+    return PeerTest(test, frames, "code")

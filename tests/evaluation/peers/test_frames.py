@@ -11,11 +11,13 @@ import pytest
 
 from navapp.errors import UsageError
 from navapp.evaluation.campaign import CampaignFolder
+from navapp.evaluation.following import Answers, FrameAnswer
 from navapp.evaluation.paper.cases import Case
 from navapp.evaluation.paper.settings import TableSettings
 from navapp.evaluation.peers.program import check_peers, run_program
 from navapp.evaluation.peers.scores import file_of, read_peers
 from navapp.evaluation.sequence import KnownSequence
+from navapp.values import Status, Verdict
 from tests.bench import peer_frames
 from tests.bench.peer_frames import Start, score
 
@@ -70,7 +72,7 @@ def test_without_a_start_no_frame_has_a_pose(sequence) -> None:
 
 
 @pytest.mark.release
-def test_a_test_is_followed_again_only_when_a_peer_is_missing(
+def test_a_test_is_followed_again_only_when_a_peer_is_missing_or_other_code(
     tmp_path, monkeypatch, capsys
 ) -> None:
     out = CampaignFolder(tmp_path / "out", SETTINGS).path
@@ -86,7 +88,29 @@ def test_a_test_is_followed_again_only_when_a_peer_is_missing(
     peer_frames.main(str(out))
     (done,) = read_peers(out, SETTINGS.tests)
     assert set(done.frames) == {"resting", "lost"}
-    assert capsys.readouterr().out.split() == [SETTINGS.tests[0].name] * 3
+    before = path.read_bytes()
+    monkeypatch.setattr(peer_frames, "find_code", lambda: "other")
+    peer_frames.main(str(out))
+    assert path.read_bytes() != before
+    assert capsys.readouterr().out.split() == [SETTINGS.tests[0].name] * 4
+
+
+@pytest.mark.release
+def test_peers_start_where_ours_is_ok(sequence, monkeypatch) -> None:
+    said = iter([Status.DEGRADED, Status.LOST, Status.OK])
+    surface = sequence.plan.bones[sequence.stage.bone].mesh
+
+    def follow(here, _method) -> Answers:
+        verdict = Verdict(next(said), 0.5, ())
+        frame = FrameAnswer(here.truth[0], None, verdict, 20.0, is_search=True)
+        return Answers((frame,), 1.0, 1, surface)
+
+    monkeypatch.setattr(peer_frames, "follow", follow)
+    assert peer_frames.find_start(sequence).place == 2
+    said = iter([Status.DEGRADED] * 5)
+    assert peer_frames.find_start(sequence).place == 4, "the last search is taken as it is"
+    said = iter([Status.LOST] * 5)
+    assert peer_frames.find_start(sequence) is None
 
 
 def test_a_check_writes_nothing(tmp_path, monkeypatch) -> None:

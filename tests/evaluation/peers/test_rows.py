@@ -46,7 +46,13 @@ def test_ours_stands_beside_twice_of_the_same_tests_alone() -> None:
 
 
 def test_our_times_are_those_of_the_pass_of_their_own() -> None:
-    timed = [Done(MAN, {"bimcc": followed(score(0.2, total_ms=5.0), score(0.2, total_ms=7.0))})]
+    timed_frames = (
+        score(0.2, total_ms=5.0),
+        score(0.2, total_ms=7.0),
+        score(0.2, total_ms=999.0, is_search=True),
+        score(None, "LOST", seen=None, total_ms=1.0),  # nothing was looked for
+    )
+    timed = [Done(MAN, {"bimcc": followed(*timed_frames)})]
     slow = [Done(MAN, {"bimcc": followed(score(0.2, total_ms=99.0))})]
     rows = by_name(make_peer_rows([peer_test(MAN, a=[0.2])], slow, timed))
     assert rows["overlay", "bimcc, OK frames"].p50_ms == 6.0

@@ -13,19 +13,17 @@ from drivers.recorded_sources import RecordedTimes
 from navapp.config import Configuration
 from navapp.control.stages import STAGES
 from navapp.errors import InputError, ResultError, RigError, UsageError
-from navapp.evaluation.following import Answers
+from navapp.evaluation.following import Answers, FrameAnswer
 from navapp.evaluation.recording import study as recording
 from navapp.evaluation.recording.report import FILES, check_folder, write_report
 from navapp.evaluation.recording.rows import RecordingRow, make_rows
 from navapp.evaluation.recording.study import RecordedFrames, Studied, Study, open_frames, study
 from navapp.evaluation.recording.tracker_motion import split_halves, to_seconds
 from navapp.evaluation.recording.truth_files import DivotTruth, OwnError, PoseTruth, Touch, Truth
-from navapp.evaluation.scores import Followed
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import RigidTransform
-from navapp.values import BoneModel, Plan, Prior
-from tests.control.fakes import a_plan, a_pose, a_rig
-from tests.evaluation.scored import score
+from navapp.values import BoneModel, Plan, Prior, Status, Verdict
+from tests.control.fakes import a_plan, a_pose, a_rig, answer
 from tests.evaluation.tracked_twice import CENTRE_MM, track_twice
 from tests.geometry.shapes import sphere
 
@@ -61,15 +59,21 @@ def a_study(source: GreySource, truth: Truth, plan=PLAN) -> Study:
     return Study("bench/1", frames, truth, Configuration(), RIG, plan, prior, STAGES[0])
 
 
+def say(word: str) -> Verdict:
+    """With a bound of half a millimetre."""
+    return replace(answer(Status(word)).verdict, predicted_tre_mm=0.5)
+
+
 def studied(monkeypatch, given: Study, **answers: Sequence[tuple[str, RigidTransform | None]]):
     """Of methods that say these words and poses, a pair for each picture."""
 
     def follow(sequence, method):
         assert all(pose is None for pose in sequence.truth), "a method is given no truth"
-        said = answers[method]
-        scores = [score(None, word, index=n, total_ms=20.0 + n) for n, (word, _) in enumerate(said)]
-        surface = given.plan.bones["femur"].mesh
-        return Answers(Followed(1.5, 1, tuple(scores[1:])), tuple(p for _, p in said), surface)
+        frames = [
+            FrameAnswer(pose, None, say(word), 20.0 + n, is_search=n == 0)
+            for n, (word, pose) in enumerate(answers[method])
+        ]
+        return Answers(tuple(frames), 1.5, 1, given.plan.bones["femur"].mesh)
 
     monkeypatch.setattr(recording, "follow", follow)
     return study(given, list(answers))
@@ -99,12 +103,12 @@ def row_of(one: Studied, method: str) -> RecordingRow:
 
 def test_errors_by_poses(monkeypatch) -> None:
     row = row_of(by_poses(monkeypatch), "bimcc")
-    assert row.errors_mm == pytest.approx([0.25, 3.0])
-    assert (row.n_frames, row.n_known, row.n_ok) == (6, 5, 3)
+    assert row.counted.errors_mm == pytest.approx([0.25, 3.0])
+    assert (row.figures.n_frames, row.known.n_frames, row.figures.n_ok) == (6, 5, 3)
     assert row.n_wrong == 1, "3 mm off, with a bound of 0.5 mm, and OK"
     assert row.coverage == 0.5
-    assert row.tre_refused_mm == pytest.approx(1.25)
-    assert row.overlay_mm == pytest.approx(1.6, rel=0.1)
+    assert row.to_json()["tre_refused_mm"] == pytest.approx(1.25)
+    assert row.counted.mean_displacement_mm == pytest.approx(1.6, rel=0.1)
     told = row.to_json()
     assert told["verdicts"] == {
         "OK": {"within_1_mm": 1, "beyond_1_mm": 1, "no_pose": 0},
@@ -119,7 +123,7 @@ def test_errors_by_poses(monkeypatch) -> None:
 
 def test_of_the_papers_methods_every_pose_counts(monkeypatch) -> None:
     row = row_of(by_poses(monkeypatch), "icp")
-    assert row.errors_mm == pytest.approx([0.25, 3.0, 2.0, 0.5])
+    assert row.counted.errors_mm == pytest.approx([0.25, 3.0, 2.0, 0.5])
 
 
 def test_the_worst_ok_frames_are_drawn(monkeypatch) -> None:
@@ -138,11 +142,33 @@ def test_errors_by_touched_points(monkeypatch) -> None:
     touched = tuple(Touch(number, "a", at) for number in (101, 102, 104))
     given = a_study(GreySource(7), DivotTruth({"a": divot}, touched))
     row = row_of(studied(monkeypatch, given, bimcc=SAID), "bimcc")
-    assert row.errors_mm == pytest.approx([0.25, 3.0])
-    assert row.n_known == 3
+    assert row.counted.errors_mm == pytest.approx([0.25, 3.0])
+    assert row.known.n_frames == 3
     assert row.verdicts["LOST"].n_without_pose == 1
     assert row.coverage is None
-    assert row.overlay_mm is None
+    assert row.n_wrong == 1, "OK and 3 mm off at the points: no bound speaks of these"
+    assert row.counted.mean_displacement_mm is None
+
+
+def test_touched_points_are_not_compared_with_the_bound(monkeypatch, tmp_path) -> None:
+    touched = (Touch(101, "a", shifted(0.0).apply(np.zeros(3))),)
+    given = a_study(GreySource(7), DivotTruth({"a": np.zeros(3)}, touched))
+    write_report(tmp_path, [studied(monkeypatch, given, bimcc=SAID)])
+    page = (tmp_path / "report.html").read_text("utf-8")
+    assert "error against bound" not in page
+    assert page.count("<svg") == 1
+
+
+def test_a_frame_in_which_no_bone_was_looked_for_has_no_time(monkeypatch) -> None:
+    given = a_study(GreySource(3), PoseTruth({"femur": {101: shifted(0.0)}}, NOT_STATED))
+    frames = (
+        FrameAnswer(shifted(0.0), None, say("OK"), 20.0, is_search=True),
+        FrameAnswer(None, None, None, 1.0, is_search=False),
+        FrameAnswer(shifted(0.0), None, say("OK"), 40.0, is_search=False),
+    )
+    mesh = PLAN.bones["femur"].mesh
+    monkeypatch.setattr(recording, "follow", lambda *_: Answers(frames, 1.5, 1, mesh))
+    assert row_of(study(given, ["bimcc"]), "bimcc").fps == pytest.approx(25.0)
 
 
 def tracked_study(seconds: float = 20.0, **changes) -> tuple[Study, list]:
@@ -167,9 +193,9 @@ def test_errors_by_another_tracker(monkeypatch) -> None:
     assert one.solved is not None
     assert refused + 100 in one.known
     assert one.known == {100 + n for n in one.solved.scored}
-    assert len(row.errors_mm) == row.n_known - 1
-    assert 0.02 < row.tre_mm < 1.0
-    assert row.tre_refused_mm == pytest.approx(9.0, abs=0.5)
+    assert len(row.counted.errors_mm) == row.known.n_frames - 1
+    assert 0.02 < row.counted.mean_mm < 1.0
+    assert row.to_json()["tre_refused_mm"] == pytest.approx(9.0, abs=0.5)
 
 
 def test_poses_that_are_not_ok_are_not_solved_with(monkeypatch) -> None:

@@ -1,11 +1,10 @@
 """Tables, report and files of the stress matrix."""
 
 import csv
-import json
 
 import pytest
 
-from navapp.evaluation.campaign import CampaignFolder
+from navapp.evaluation.campaign import CampaignFolder, Done
 from navapp.evaluation.stress.matrix import StressSettings
 from navapp.evaluation.stress.results import write_stress
 from tests.evaluation.scored import followed, score
@@ -20,9 +19,7 @@ def keep(folder: CampaignFolder, frames_of) -> None:
     for test in SETTINGS.tests:
         frames = frames_of(test)
         if frames is not None:
-            content = {"test": test.name, "seed": test.seed,
-                       "methods": {"bimcc": followed(*frames).to_json()}}  # fmt: skip
-            folder.file_of(test, is_timed=False).write_text(json.dumps(content))
+            folder.write(Done(test, {"bimcc": followed(*frames)}), is_timed=False)
 
 
 def frames_of(test):
@@ -46,6 +43,7 @@ def test_the_causes_stand_first_and_their_hidden_levels_do_not_count(written) ->
     assert not light["is_cause"]
     # -2 and 2 % are hidden, -5 and 5 % are not.
     assert (scale["wrong_and_ok"], light["wrong_and_ok"]) == (4, 2)
+    assert scale["wrong_and_ok_hidden"] == 4
     assert content["summary"]["judged"]["wrong_and_ok"] == 6
     assert content["summary"]["wrong_and_ok_on"] == ["scale", "light"]
     assert scale["one_mm_passed_at"] == [
@@ -60,7 +58,7 @@ def test_the_causes_stand_first_and_their_hidden_levels_do_not_count(written) ->
     ]  # fmt: skip
     assert "| scale of the plan, % | 1.55 at -5; 1.55 at -2; 0.15 at -1; " in text
     assert "; 1.55 at 5 | -1.61 % and 1.61 % | - | the check on the patient |" in text
-    assert "| 2 (hidden) | 100% | 1.55 | 1.60 | 1.55 | 2 | 0% | - |" in text
+    assert "| 2 (hidden) | 100 % | 1.55 | 1.60 | 1.55 | 2 | 0 % | - |" in text
 
 
 def test_where_ok_ends_stands_with_its_reason(written) -> None:
@@ -69,8 +67,9 @@ def test_where_ok_ends_stands_with_its_reason(written) -> None:
     assert light["ok_kept_up_to"] == [0.2, 8.0]
     assert light["ok_ends_at"] == [None, None], "half of the frames are OK"
     text = (path / "stress.md").read_text()
-    assert "| 0.1 | 50% | 0.30 | 0.30 | 0.20 | 0 | 100% | one picture is dark (100%) |" in text
+    assert "| 0.1 | 50 % | 0.30 | 0.30 | 0.20 | 0 | 100 % | one picture is dark (100 %) |" in text
     assert "- light on the sensors: 2, at 8 times; found by the judge, in the pictures" in text
+    assert "- at levels that pictures cannot show, not counted above: scale 4" in text
 
 
 def test_every_frame_is_in_the_csv_and_the_report_needs_nothing_else(written) -> None:
@@ -108,7 +107,6 @@ def test_a_large_level_is_told_without_an_exponent(tmp_path) -> None:
     settings = StressSettings(("noise",), 1, 2, 1)
     folder = CampaignFolder(tmp_path, settings)
     for test in settings.tests:
-        content = {"test": test.name, "seed": 1, "methods": {"bimcc": followed(*GOOD).to_json()}}
-        folder.file_of(test, is_timed=False).write_text(json.dumps(content))
+        folder.write(Done(test, {"bimcc": followed(*GOOD)}), is_timed=False)
     write_stress(folder, settings)
     assert "| 20000 e | 100 e | - |" in (tmp_path / "stress.md").read_text()

@@ -21,13 +21,13 @@ def test_a_row_pools_the_knees_of_its_level() -> None:
         "light", {1.0: [[score(0.1), score(0.2), doubted], [score(0.6), doubted, LOST]]}
     )
     (row,) = make_axis_rows(AXES["light"], done).rows
-    assert (row.level, row.n_knees, row.n_frames, row.n_ok) == (1.0, 2, 6, 3)
+    assert (row.level, row.n_knees, row.figures.n_frames, row.figures.n_ok) == (1.0, 2, 6, 3)
     assert row.ok_share == 0.5
     assert (row.tre_mm, row.worst_mm) == (0.2, 0.6)
     assert row.tre_any_mm == 0.6, "median of 0.1, 0.2, 0.6, 3 and 3"
     # The bound of these scores is 0.5 mm.
-    assert row.coverage == pytest.approx(2.0 / 3.0)
-    assert row.n_wrong == 0
+    assert row.figures.bound_coverage == pytest.approx(2.0 / 3.0)
+    assert row.every.n_wrong == 0
     assert (row.reason, row.reason_share) == ("dark", pytest.approx(2.0 / 3.0))
     assert row.to_json()["ok_share"] == 0.5
 
@@ -35,14 +35,14 @@ def test_a_row_pools_the_knees_of_its_level() -> None:
 def test_wrong_frames_count_where_pictures_can_show_them() -> None:
     levels = {0.0: [frames(0.1)], 2.0: [frames(1.2)], 5.0: [frames(1.3, 4)]}
     rows = make_axis_rows(AXES["scale"], stressed("scale", levels))
-    assert [row.n_wrong for row in rows.rows] == [0, 10, 4]
+    assert [row.every.n_wrong for row in rows.rows] == [0, 10, 4]
     assert [row.is_hidden for row in rows.rows] == [False, True, False]
-    assert rows.n_wrong == 4
+    assert (rows.n_wrong, rows.n_wrong_hidden) == (4, 10)
 
 
 def test_a_level_without_a_pose_has_no_figures() -> None:
     (row,) = make_axis_rows(AXES["light"], stressed("light", {1.0: [[LOST]]})).rows
-    assert (row.tre_mm, row.worst_mm, row.tre_any_mm, row.coverage) == (None,) * 4
+    assert (row.tre_mm, row.worst_mm, row.tre_any_mm, row.figures.bound_coverage) == (None,) * 4
     no_reason = score(None, "LOST", reasons=(), seen=None)
     (row,) = make_axis_rows(AXES["light"], stressed("light", {1.0: [[no_reason]]})).rows
     assert row.reason == "no pose"
@@ -83,7 +83,15 @@ def test_only_frames_that_show_the_level_count() -> None:
     (done,) = stressed("blur", {1.5: [scores]})
     assert [frame.index for frame in list_counted(done)] == [9, 10, 11]
     (row,) = make_axis_rows(AXES["blur"], [done]).rows
-    assert (row.n_frames, row.tre_mm) == (3, pytest.approx(1.0))
+    assert (row.figures.n_frames, row.tre_mm) == (3, pytest.approx(1.0))
+
+
+def test_a_wrong_frame_counts_wherever_the_leg_is() -> None:
+    # At rest until 0.2 s: nothing of the level is shown in the first.
+    scores = [score(5.0, index=1), score(0.1, index=9), score(0.2, index=10)]
+    (row,) = make_axis_rows(AXES["blur"], stressed("blur", {1.5: [scores]})).rows
+    assert row.ok_share == row.figures.bound_coverage == 1.0
+    assert (row.every.n_wrong, row.worst_mm) == (1, 5.0)
 
 
 def moving(tre_mm: float, **changes):
