@@ -13,6 +13,7 @@ from navapp.errors import UsageError
 if TYPE_CHECKING:
     from navapp.evaluation.campaign import Campaign, CampaignFolder
     from navapp.evaluation.paper.cases import Case
+    from navapp.tracking import Method
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,13 +74,20 @@ def choose_cases(
     return tuple(
         case
         for case in ALL_CASES
-        if is_chosen(case.sample, samples)
-        and is_chosen(case.stage, options.stages)
-        and is_chosen(case.situation, options.situations)
+        if _is_chosen(case.sample, samples)
+        and _is_chosen(case.stage, options.stages)
+        and _is_chosen(case.situation, options.situations)
     )
 
 
-def is_chosen(name: str, chosen: list[str] | None) -> bool:
+def choose_methods(options: argparse.Namespace) -> "tuple[Method, ...]":
+    """Of --methods, in the order of the tables."""
+    from navapp.evaluation.methods import METHODS
+
+    return tuple(name for name in METHODS if _is_chosen(name, options.methods))
+
+
+def _is_chosen(name: str, chosen: list[str] | None) -> bool:
     """Whether an option names it; all are chosen where the option is left out."""
     return chosen is None or name in chosen
 

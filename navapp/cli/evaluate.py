@@ -6,16 +6,16 @@ from typing import TYPE_CHECKING, Any
 from navapp.cli.campaign_options import (
     Counts,
     choose_cases,
-    is_chosen,
+    choose_methods,
     read_counts,
     run_and_write,
 )
 from navapp.cli.diagnostics import Diagnostics
 from navapp.cli.evaluate_ablation import add_ablation_options, run_ablation
+from navapp.cli.evaluate_kinds import find_kind
 from navapp.cli.evaluate_peers import add_peers_option, prepare_peers, run_peers, say_peers
-from navapp.cli.evaluate_recording import add_options, check_no_recording, run_recording
-from navapp.cli.evaluate_stress import add_stress_options, check_no_stress, run_stress
-from navapp.errors import UsageError
+from navapp.cli.evaluate_recording import add_options, run_recording
+from navapp.cli.evaluate_stress import add_stress_options, run_stress
 
 if TYPE_CHECKING:
     from navapp.evaluation.campaign import CampaignFolder
@@ -65,7 +65,7 @@ def add_parser(subparsers: Any) -> None:
     )
     parser.add_argument("--seed", type=int, metavar="N", help="of the first knee")
     parser.add_argument(
-        "--quick", action="store_true", help="one test of 5 frames of each case: no results"
+        "--quick", action="store_true", help="one test of 5 frames of each case: a trial run"
     )
     parser.add_argument(
         "--processes", type=int, metavar="N", help="at a time (the computer's cores, at most 4)"
@@ -79,18 +79,22 @@ def add_parser(subparsers: Any) -> None:
 
 
 def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
-    """Do it; the exit code."""
+    """Run the evaluation that the options ask for, and return the exit code."""
+    kind = find_kind(options)
+    if kind == "recording":
+        return run_recording(options, diagnostics)
+    if kind == "stress":
+        return run_stress(options, diagnostics)
+    if kind == "ablation":
+        return run_ablation(options, diagnostics)
+    return _run_tables(options, diagnostics)
+
+
+def _run_tables(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     from navapp.evaluation.paper.results import write_results
 
-    prepare_peers(options)
-    if options.recording is not None:
-        return _run_recording(options, diagnostics)
-    check_no_recording(options)
-    if options.stress:
-        return _run_stress(options, diagnostics)
-    check_no_stress(options)
-    if options.ablation:
-        return run_ablation(options, diagnostics)
+    if options.peers:
+        prepare_peers()
     settings = _read_settings(options)
 
     def write(folder: "CampaignFolder[CaseTest]") -> dict[str, Any]:
@@ -106,43 +110,15 @@ def run(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     return 0
 
 
-def _run_stress(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
-    for name in ("samples", "stages", "situations", "methods"):
-        if getattr(options, name) is not None:
-            raise UsageError(f"--{name} is of the tables", remedy="leave it out, or --stress")
-    if options.ablation:
-        raise UsageError("--stress and --ablation are two evaluations", remedy="run one at a time")
-    return run_stress(options, diagnostics)
-
-
-def _run_recording(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
-    from navapp.evaluation.methods import METHODS
-
-    of_knees = (
-        "samples", "stages", "situations", "tests", "frames", "seed", "quick", "processes",
-        "stress", "axes", "ablation",
-    )  # fmt: skip
-    for name in of_knees:
-        # A seed of 0 is given as well.
-        if not any(getattr(options, name) is unset for unset in (None, False)):
-            raise UsageError(
-                f"--{name} is of simulated knees", remedy="leave it out, or --recording"
-            )
-    methods = [name for name in METHODS if is_chosen(name, options.methods)]
-    return run_recording(options, methods, diagnostics)
-
-
 def _read_settings(options: argparse.Namespace) -> "TableSettings":
-    from navapp.evaluation.methods import METHODS
     from navapp.evaluation.paper.cases import FIRST_SEED, MOST_TESTS
     from navapp.evaluation.paper.settings import TableSettings
 
     usual = Counts(_TESTS, _FRAMES, FIRST_SEED)
     counts = read_counts(options, usual, _QUICK_FRAMES, MOST_TESTS, "case")
-    methods = tuple(name for name in METHODS if is_chosen(name, options.methods))
     return TableSettings(
         choose_cases(options),
-        methods,
+        choose_methods(options),
         counts.tests,
         counts.frames,
         counts.first_seed,
@@ -152,7 +128,7 @@ def _read_settings(options: argparse.Namespace) -> "TableSettings":
 
 def _say(summary: dict[str, Any], out: str, diagnostics: Diagnostics) -> None:
     if summary["quick"]:
-        diagnostics.say("a quick look, no results: one short test of each case")
+        diagnostics.say("a trial run, no results: one short test of each case")
     for method, one in summary["judged"].items():
         diagnostics.say(
             f"{method}: {one['ok']} of {one['frames']} frames OK, {one['wrong_and_ok']} of them "

@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING, Any
 
 from navapp.cli.campaign_options import Counts, choose_cases, read_counts, run_and_write
 from navapp.cli.diagnostics import Diagnostics
-from navapp.errors import UsageError
 
 if TYPE_CHECKING:
     from navapp.evaluation.paper.settings import TableSettings
@@ -25,7 +24,7 @@ def add_ablation_options(parser: argparse.ArgumentParser) -> None:
 
 
 def run_ablation(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
-    """Do it; the exit code."""
+    """Run the evaluation, and return the exit code."""
     from navapp.evaluation.ablation.results import write_ablation
 
     settings = _read_settings(options)
@@ -46,8 +45,6 @@ def _read_settings(options: argparse.Namespace) -> "TableSettings":
     from navapp.evaluation.paper.cases import FIRST_ABLATION_SEED, MOST_TESTS
     from navapp.evaluation.paper.settings import TableSettings
 
-    if options.methods is not None:
-        raise UsageError("--methods is of the tables", remedy="leave it out, or --ablation")
     usual = Counts(_TESTS, _FRAMES, FIRST_ABLATION_SEED)
     counts = read_counts(options, usual, _QUICK_FRAMES, MOST_TESTS, "case")
     cases, variants = choose_cases(options, _SAMPLES), tuple(VARIANTS)
@@ -58,7 +55,7 @@ def _read_settings(options: argparse.Namespace) -> "TableSettings":
 
 def _say(summary: dict[str, Any], out: str, diagnostics: Diagnostics) -> None:
     if summary["quick"]:
-        diagnostics.say("a quick look, no results: one short test of each case")
+        diagnostics.say("a trial run, no results: one short test of each case")
     for row in summary["variants"]:
         mean_mm, any_mm = (
             "-" if row[name] is None else f"{row[name]:.3f}" for name in ("tre_ok_mm", "tre_any_mm")

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from navapp.cli.diagnostics import Diagnostics
-from navapp.errors import UsageError
 
 if TYPE_CHECKING:
     from navapp.evaluation.paper.cases import CaseTest
@@ -21,17 +20,12 @@ def add_peers_option(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def prepare_peers(options: argparse.Namespace) -> None:
-    """Refuse --peers where it cannot be meant, or could not be done.
+def prepare_peers() -> None:
+    """Refuse --peers where they could not be run.
 
     Raises:
-        UsageError: it is not of the tables, or what the peers need is missing.
+        UsageError: what the peers need is missing.
     """
-    if not options.peers:
-        return
-    for name in ("recording", "stress", "ablation"):
-        if getattr(options, name):
-            raise UsageError("--peers is of the tables", remedy=f"leave it out, or --{name}")
     from navapp.evaluation.peers.program import check_peers
 
     check_peers()

@@ -6,21 +6,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from navapp.cli.campaign_options import choose_methods
 from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
 from navapp.errors import ResultError, SequenceError, UsageError
 
 if TYPE_CHECKING:
     from navapp.cli.session_folder import RecordedSession
     from navapp.config import Configuration
-    from navapp.evaluation.recording.study import Studied
-    from navapp.evaluation.recording.truth_files import Truth
-    from navapp.geometry.rig import StereoRig
+    from navapp.evaluation.recording.study import Studied, Study
     from navapp.tracking import Method
-    from navapp.values import Plan, Prior, StageSpec
 
 _TRUTH, _PRIOR, _RIG = "truth.json", "prior.json", "rig.yml"
-# Options that mean nothing without a recording.
-_ONLY_HERE = ("rig", "plan", "truth", "prior", "bone", "fps", "allow_unaccepted")
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -49,19 +45,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def check_no_recording(options: argparse.Namespace) -> None:
-    """Refuse options of a recording without one.
-
-    Raises:
-        UsageError: there is one.
-    """
-    for name in _ONLY_HERE:
-        if getattr(options, name) not in (None, False):
-            raise UsageError(
-                f"--{name.replace('_', '-')} is of a recording", remedy="add --recording SEQ"
-            )
-
-
 @dataclass(frozen=True, slots=True)
 class _Sequence:
     """A recording and the files that belong to it."""
@@ -72,10 +55,8 @@ class _Sequence:
     prior_path: str | None  # None: that of the session or the configuration
 
 
-def run_recording(
-    options: argparse.Namespace, methods: "Sequence[Method]", diagnostics: Diagnostics
-) -> int:
-    """Do it; the exit code."""
+def run_recording(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
+    """Run the evaluation, and return the exit code."""
     from navapp.config import find_file, load
     from navapp.evaluation.recording.report import check_folder, write_report
 
@@ -89,7 +70,7 @@ def run_recording(
         _read(sequence, options, configuration, diagnostics)
         for sequence in _list_sequences(options, diagnostics)
     ]
-    studied, failures = _study_all(given, methods, diagnostics)
+    studied, failures = _study_all(given, choose_methods(options), diagnostics)
     content = write_report(folder, studied)
     write_json(str(folder / "evaluate.json"), "evaluate", content)
     write_json(options.json, "evaluate", content)
@@ -121,7 +102,7 @@ def _study_all(
         except ResultError as error:
             if len(given) == 1:
                 raise
-            diagnostics.warn(f"{one.sequence.name} is left out: {error}")
+            diagnostics.warn(f"{one.study.name} is left out: {error}")
             failures.append(error)
     if not studied:
         raise failures[0]
@@ -176,13 +157,8 @@ def _find_beside(path: Path, name: str) -> str | None:
 class _Given:
     """What a recording is evaluated with."""
 
-    sequence: _Sequence
-    configuration: "Configuration"
-    truth: "Truth"
-    rig: "StereoRig"
-    plan: "Plan"
-    prior: "Prior"
-    stage: "StageSpec"
+    source: str  # of its pictures
+    study: "Study"
     rate_hz: float  # where there are no times
 
 
@@ -200,6 +176,7 @@ def _read(
     from navapp.cli.session_folder import is_session, read_session
     from navapp.control.prior_files import read_prior
     from navapp.control.stages import stage_by_name
+    from navapp.evaluation.recording.study import Study
     from navapp.evaluation.recording.truth_files import read_truth
     from navapp.geometry.rig_files import read_rig
     from navapp.preop import read_plan
@@ -219,21 +196,18 @@ def _read(
     check_start(prior, stage.bone)
     check_recorded_truth(truth, sequence.truth_path, sequence.source, stage.bone)
     rate_hz = configuration.camera.rate_hz if options.fps is None else options.fps
-    return _Given(sequence, configuration, truth, rig, plan, prior, stage, rate_hz)
+    study = Study(sequence.name, truth, configuration, rig, plan, prior, stage)
+    return _Given(sequence.source, study, rate_hz)
 
 
 def _study(given: _Given, methods: "Sequence[Method]", diagnostics: Diagnostics) -> "Studied":
-    from navapp.evaluation.recording.study import Study, open_frames, study
+    from navapp.evaluation.recording.study import open_frames, study
 
-    name = given.sequence.name
+    name = given.study.name
     told = _Progress(name, len(methods), diagnostics)
-    with open_frames(given.sequence.source, given.rig, given.rate_hz, told) as frames:
+    with open_frames(given.source, given.study.rig, given.rate_hz, told) as frames:
         diagnostics.note(f"{name}: {len(frames)} pairs, {', '.join(methods)}")
-        one = Study(
-            name, frames, given.truth, given.configuration, given.rig, given.plan, given.prior,
-            given.stage,
-        )  # fmt: skip
-        return study(one, methods)
+        return study(given.study, frames, methods)
 
 
 def _find_rig_and_plan(

@@ -26,18 +26,8 @@ def add_stress_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def check_no_stress(options: argparse.Namespace) -> None:
-    """Refuse options of the stress matrix without it.
-
-    Raises:
-        UsageError: there is one.
-    """
-    if options.axes is not None:
-        raise UsageError("--axes is of the stress matrix", remedy="add --stress")
-
-
 def run_stress(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
-    """Do it; the exit code."""
+    """Run the evaluation, and return the exit code."""
     from navapp.evaluation.stress.results import write_stress
 
     settings = _read_settings(options)
@@ -70,7 +60,7 @@ def _read_axes(asked: list[str] | None, known: tuple[str, ...]) -> tuple[str, ..
 
 def _say(summary: dict[str, Any], out: str, diagnostics: Diagnostics) -> None:
     if summary["quick"]:
-        diagnostics.say("a quick look, no results: one knee and a few frames a level")
+        diagnostics.say("a trial run, no results: one knee and a few frames a level")
     judged = summary["judged"]
     diagnostics.say(
         f"{judged['ok']} of {judged['frames']} frames OK, {judged['wrong_and_ok']} of them wrong "

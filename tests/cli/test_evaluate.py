@@ -180,7 +180,7 @@ def test_the_same_again_runs_nothing_and_says_the_same(quick, capsys, monkeypatc
     assert json.loads(capsys.readouterr().out) == json.loads(done.stdout)
     assert run(["evaluate", *QUICK, "--out", str(out)]) == 0
     said = capsys.readouterr().out
-    assert "a quick look, no results" in said
+    assert "a trial run, no results" in said
     assert "bimcc: 5 of 5 frames OK, 0 of them wrong" in said
     assert "the paper's own figures" not in said, "no results, no comparison"
 

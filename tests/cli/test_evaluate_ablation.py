@@ -55,10 +55,10 @@ def test_what_is_chosen_stands_in_the_order_of_the_tables(ran, tmp_path) -> None
         (["--tests", "0"], "--tests must be from 1 to 100"),
         (["--frames", "0"], "--frames must be at least 1"),
         (["--seed", "-1"], "--seed must not be negative"),
-        (["--methods", "bimcc"], "--methods is of the tables: leave it out, or --ablation"),
-        (["--axes", "light"], "--axes is of the stress matrix"),
+        (["--methods", "bimcc"], "--methods cannot be used with --ablation: leave one of them out"),
+        (["--axes", "light"], "--axes cannot be used with --ablation"),
         (["--stress"], "--stress and --ablation are two evaluations: run one at a time"),
-        (["--recording", "pairs"], "--ablation is of simulated knees"),
+        (["--recording", "pairs"], "--recording and --ablation are two evaluations"),
     ],
 )
 def test_what_makes_no_sense_is_refused_in_one_sentence(
@@ -83,7 +83,7 @@ def test_a_quick_look_at_one_case_from_end_to_end(tmp_path, capsys, monkeypatch)
         capture_output=True, text=True, timeout=170, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    assert "a quick look, no results" in done.stdout
+    assert "a trial run, no results" in done.stdout
     assert "without contour: 5 of 5 frames OK" in done.stdout
     content = json.loads((out / "ablation.json").read_text())
     rows = {row["variant"]: row for row in content["rows"]}

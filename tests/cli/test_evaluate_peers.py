@@ -28,9 +28,9 @@ def ran(monkeypatch) -> list[str]:
 
     def follow(folder, settings, *_: object) -> None:
         order.append("ours")
-        content = {"methods": {"bimcc": followed(score(0.1), score(0.3)).to_json()}}
+        answers = {"bimcc": followed(score(0.1), score(0.3))}
         for test in settings.tests:
-            folder.file_of(test, is_timed=False).write_text(json.dumps(content))
+            folder.write(campaign.Done(test, answers), is_timed=False)
 
     def follow_too(folder, on_done) -> None:
         order.append("peers")
@@ -92,5 +92,8 @@ def test_missing_they_are_refused_before_anything_is_run(
 @pytest.mark.parametrize("options", [["--stress"], ["--ablation"], ["--recording", "pairs"]])
 def test_they_are_of_the_tables_alone(ran, tmp_path, capsys, options) -> None:
     assert run(["--quiet", "evaluate", *options, "--peers", "--out", str(tmp_path / "out")]) == 2
-    assert f"--peers is of the tables: leave it out, or {options[0]}" in capsys.readouterr().err
+    assert (
+        f"--peers cannot be used with {options[0]}: leave one of them out"
+        in capsys.readouterr().err
+    )
     assert ran == []

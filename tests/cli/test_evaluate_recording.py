@@ -133,10 +133,14 @@ def test_a_replay_tells_the_error_of_every_frame(plan, recordings, tmp_path, cap
 @pytest.mark.parametrize(
     ("words", "code", "told"),
     [
-        (("--truth", "t.json"), 2, "--truth is of a recording: add --recording"),
-        (("--allow-unaccepted",), 2, "--allow-unaccepted is of a recording"),
-        (("--recording", "x", "--seed", "3"), 2, "--seed is of simulated knees"),
-        (("--recording", "x", "--stages", "opening"), 2, "--stages is of simulated knees"),
+        (("--truth", "t.json"), 2, "--truth means nothing without --recording: add --recording"),
+        (("--allow-unaccepted",), 2, "--allow-unaccepted means nothing without --recording"),
+        (("--recording", "x", "--seed", "3"), 2, "--seed cannot be used with --recording"),
+        (
+            ("--recording", "x", "--stages", "opening"),
+            2,
+            "--stages cannot be used with --recording",
+        ),
         (("--recording", "nowhere", "--truth", "t"), 3, "there is no recording nowhere"),
         (("--recording", "x"), 2, "nothing says where the bone was in x"),
         (("--recording", "x", "--truth", "t", "--fps", "0"), 2, "0 Hz"),
@@ -212,12 +216,12 @@ def test_recordings_without_a_start_are_named(tmp_path, capsys) -> None:
 
 def test_one_recording_that_fails_does_not_lose_the_others(monkeypatch, capsys) -> None:
     def study(given, methods, diagnostics):
-        if given.sequence.name == "bad":
+        if given.study.name == "bad":
             raise ResultError("cannot be solved", remedy="move more")
-        return given.sequence.name
+        return given.study.name
 
     monkeypatch.setattr(evaluate_recording, "_study", study)
-    good, bad = (SimpleNamespace(sequence=SimpleNamespace(name=name)) for name in ("good", "bad"))
+    good, bad = (SimpleNamespace(study=SimpleNamespace(name=name)) for name in ("good", "bad"))
     studied, failures = evaluate_recording._study_all([bad, good], ("bimcc",), Diagnostics())
     assert (studied, len(failures)) == (["good"], 1)
     assert "bad is left out: cannot be solved: move more" in capsys.readouterr().err

@@ -54,9 +54,9 @@ def test_what_is_chosen_stands_in_the_order_of_the_table(ran, tmp_path) -> None:
         (["--processes", "0"], "--processes must be at least 1"),
         (["--seed", "-1"], "--seed must not be negative"),
         (["--axes", "light", "moon"], "there is no axis 'moon': use turn-sideways, "),
-        (["--methods", "icp"], "--methods is of the tables"),
-        (["--stages", "opening"], "--stages is of the tables"),
-        (["--recording", "pairs"], "--stress is of simulated knees"),
+        (["--methods", "icp"], "--methods cannot be used with --stress"),
+        (["--stages", "opening"], "--stages cannot be used with --stress"),
+        (["--recording", "pairs"], "--recording and --stress are two evaluations"),
     ],
 )
 def test_what_makes_no_sense_is_refused_in_one_sentence(
@@ -85,7 +85,7 @@ def test_a_surface_beside_its_targets_is_off_by_as_much_and_looks_well(tmp_path)
         env=make_child_environment(), capture_output=True, text=True, timeout=110, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    assert "a quick look, no results" in done.stdout + done.stderr
+    assert "a trial run, no results" in done.stdout + done.stderr
     content = json.loads((out / "stress.json").read_text())
     (axis,) = content["axes"]
     assert axis["found_by"] == "the check on the patient"

@@ -232,9 +232,7 @@ def test_a_result_that_cannot_be_written_is_told(line, tmp_path, monkeypatch) ->
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(campaign, "write_whole", refuse)
-    with pytest.raises(
-        InputError, match=r"written \(No space left on device\): make room"
-    ):
+    with pytest.raises(InputError, match=r"written \(No space left on device\): make room"):
         run_campaign(folder, SETTINGS, 2, lambda *_: None)
 
 

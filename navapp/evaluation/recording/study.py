@@ -98,10 +98,9 @@ def open_frames(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Study:
-    """What every method is given, and the truth that none is given."""
+    """What every method is given beside the pictures, and the truth that none is given."""
 
     name: str  # of the recording
-    frames: RecordedFrames
     truth: Truth
     configuration: Configuration
     rig: StereoRig
@@ -109,11 +108,13 @@ class Study:
     prior: Prior
     stage: StageSpec
 
-    def to_sequence(self, truth: Sequence[RigidTransform | None] = ()) -> KnownSequence:
+    def to_sequence(
+        self, frames: RecordedFrames, truth: Sequence[RigidTransform | None] = ()
+    ) -> KnownSequence:
         """The recording with true poses, as far as they are known."""
         return KnownSequence(
-            self.frames,
-            truth or (None,) * len(self.frames),
+            frames,
+            truth or (None,) * len(frames),
             self.configuration,
             self.rig,
             self.plan,
@@ -139,37 +140,40 @@ class Studied:
     pictures: tuple[tuple[FrameScore, bytes], ...]  # its worst frames
 
 
-def study(given: Study, methods: Sequence[Method]) -> Studied:
+def study(given: Study, frames: RecordedFrames, methods: Sequence[Method]) -> Studied:
     """Follow the bone with each method, then score all alike.
 
     Raises:
         ResultError: the truth's own frames cannot be solved.
         SequenceError: a picture cannot be read.
     """
-    answers = {method: follow(given.to_sequence(), method) for method in methods}
+    answers = {method: follow(given.to_sequence(frames), method) for method in methods}
     # Ours leads, because its judge tells which poses may be solved with.
     leading: Method = OURS if OURS in answers else methods[0]
-    poses, solved = _find_truth(given, answers[leading])
-    scored = {method: _score(given, one, poses) for method, one in answers.items()}
+    poses, solved = _find_truth(given, frames, answers[leading])
+    sequence = given.to_sequence(frames, poses)
+    scored = {
+        method: _score(given, sequence, one, frames.numbers) for method, one in answers.items()
+    }
     return Studied(
         given.name,
         given.stage.name,
         given.stage.bone,
         given.truth,
-        given.frames.has_times,
-        _find_known(given, poses),
-        {method: _number(one, given.frames.numbers) for method, one in scored.items()},
+        frames.has_times,
+        _find_known(given, frames.numbers, poses),
+        {method: _number(one, frames.numbers) for method, one in scored.items()},
         leading,
         solved,
-        tuple(_draw_worst(given, answers[leading], scored[leading], poses)),
+        tuple(_draw_worst(sequence, answers[leading], scored[leading], frames.numbers)),
     )
 
 
 def _find_truth(
-    given: Study, leading: Answers
+    given: Study, frames: RecordedFrames, leading: Answers
 ) -> tuple[list[RigidTransform | None], SolvedFrames | None]:
     """True poses in the pictures, left camera from bone; None where they are not known."""
-    truth, frames = given.truth, given.frames
+    truth = given.truth
     if isinstance(truth, DivotTruth):
         return [None] * len(frames), None
     if isinstance(truth, PoseTruth):
@@ -182,18 +186,21 @@ def _find_truth(
     return find_poses(solved, truth, frames.times_ns), solved
 
 
-def _find_known(given: Study, true: Sequence[RigidTransform | None]) -> frozenset[int]:
+def _find_known(
+    given: Study, numbers: Sequence[int], true: Sequence[RigidTransform | None]
+) -> frozenset[int]:
     if isinstance(given.truth, DivotTruth):
         return frozenset(given.truth.numbers)
-    numbers = given.frames.numbers
     return frozenset(number for number, pose in zip(numbers, true, strict=True) if pose)
 
 
-def _score(given: Study, answers: Answers, true: Sequence[RigidTransform | None]) -> Followed:
-    followed = score_answers(given.to_sequence(true), answers, has_budget=False)
+def _score(
+    given: Study, sequence: KnownSequence, answers: Answers, numbers: Sequence[int]
+) -> Followed:
+    followed = score_answers(sequence, answers, has_budget=False)
     if not isinstance(given.truth, DivotTruth):
         return followed
-    touched_mm = measure_divots(answers.poses, given.frames.numbers, given.truth)
+    touched_mm = measure_divots(answers.poses, numbers, given.truth)
     frames = (replace(one, tre_mm=touched_mm[one.index]) for one in followed.frames)
     return replace(followed, frames=tuple(frames))
 
@@ -205,14 +212,13 @@ def _number(followed: Followed, numbers: Sequence[int]) -> Followed:
 
 
 def _draw_worst(
-    given: Study, answers: Answers, followed: Followed, true: Sequence[RigidTransform | None]
+    sequence: KnownSequence, answers: Answers, followed: Followed, numbers: Sequence[int]
 ) -> Iterator[tuple[FrameScore, bytes]]:
     """The largest errors that the judge calls OK; of all poses when it calls none so."""
     known = [one for one in followed.frames if one.tre_mm is not None]
     chosen = [one for one in known if one.is_ok] or known
     chosen.sort(key=lambda one: one.tre_mm or 0.0, reverse=True)
-    sequence = given.to_sequence(true)
     for one in chosen[:_N_PICTURES]:
         picture = draw_frame(sequence, answers, one.index)
         if picture is not None:
-            yield replace(one, index=given.frames.numbers[one.index]), picture
+            yield replace(one, index=numbers[one.index]), picture

@@ -7,16 +7,19 @@ smallest residuals stands.
 """
 
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
+from navapp.geometry.bands import map_both
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.registration import DepthMap, PoseSampler, rank_fits
 from navapp.tracking.following import Follower, RestSettings
-from navapp.tracking.frame import Fit, Frame
+from navapp.tracking.frame import Fit, Frame, ignore
 from navapp.tracking.surface_meter import Measurement, SurfaceMeter
+from navapp.values import Stopwatch
 from navapp.values.progress import tell_part
 
 # All chosen; compared in tests.bench.buried_bone. The same pictures give the same draws.
@@ -112,14 +115,18 @@ class BuriedSearch:
 
     def _step_from(self, frame: Frame, starts: list[RigidTransform]) -> list[Place]:
         """Where one step onto the model leads from each start."""
-        places = []
-        for start in starts:
-            fit = self._stepper.follow(frame, start, skips_samples=True)
-            if fit is not None and fit.estimate.has_finite_covariance:
-                depth = DepthMap.of(self._meter.geometry, fit.measured.disparity)
-                score = self._sampler.score(depth, fit.pose, _SIGMA_MM, _N_POINTS)
-                places.append(Place(fit, score))
-        return places
+        _ = self._sampler  # made here once, not in both threads
+
+        def step(start: RigidTransform) -> Place | None:
+            fit = self._stepper.follow(_with_own_watch(frame), start, skips_samples=True)
+            if fit is None or not fit.estimate.has_finite_covariance:
+                return None
+            depth = DepthMap.of(self._meter.geometry, fit.measured.disparity)
+            return Place(fit, self._sampler.score(depth, fit.pose, _SIGMA_MM, _N_POINTS))
+
+        places = map_both(step, starts, ignore)
+        frame.watch.lap("estimate")
+        return [place for place in places if place is not None]
 
     def _improve(
         self, frame: Frame, places: list[Place], one: Round, random: np.random.Generator
@@ -142,8 +149,13 @@ class BuriedSearch:
         return [fit.pose.move(twist, centre_mm) for twist in twists]
 
     def _rest(self, frame: Frame, places: list[Place]) -> list[Fit]:
-        found = (self._follower.follow(frame, one.fit.pose, skips_samples=True) for one in places)
-        return [fit for fit in found if fit is not None]
+        def rest(place: Place) -> Fit | None:
+            own = _with_own_watch(frame)
+            return self._follower.follow(own, place.fit.pose, skips_samples=True)
+
+        fits = map_both(rest, places, ignore)
+        frame.watch.lap("estimate")
+        return [fit for fit in fits if fit is not None]
 
     def select(self, fits: list[Fit]) -> Fit | None:
         """The fit at rest with the smallest residuals; ambiguous when another's are as small."""
@@ -157,6 +169,11 @@ class BuriedSearch:
         """At which a rotation moves the bone as much as a shift does."""
         offsets_mm = self._meter.model.points_mm - self._meter.model.centre_mm
         return float(np.sqrt((offsets_mm**2).sum(axis=1).mean()))
+
+
+def _with_own_watch(frame: Frame) -> Frame:
+    """For another thread: a stopwatch is used by one only."""
+    return replace(frame, watch=Stopwatch())
 
 
 def _select_best(places: list[Place], n: int) -> list[Place]:

@@ -53,10 +53,9 @@ class GreySource:
         pass
 
 
-def a_study(source: GreySource, truth: Truth, plan=PLAN) -> Study:
-    frames = RecordedFrames(source, RIG, 15.0)
+def a_study(truth: Truth, plan=PLAN) -> Study:
     prior = Prior({"femur": a_pose()})
-    return Study("bench/1", frames, truth, Configuration(), RIG, plan, prior, STAGES[0])
+    return Study("bench/1", truth, Configuration(), RIG, plan, prior, STAGES[0])
 
 
 def say(word: str) -> Verdict:
@@ -64,7 +63,12 @@ def say(word: str) -> Verdict:
     return replace(answer(Status(word)).verdict, predicted_tre_mm=0.5)
 
 
-def studied(monkeypatch, given: Study, **answers: Sequence[tuple[str, RigidTransform | None]]):
+def studied(
+    monkeypatch,
+    given: Study,
+    source: GreySource,
+    **answers: Sequence[tuple[str, RigidTransform | None]],
+) -> Studied:
     """Of methods that say these words and poses, a pair for each picture."""
 
     def follow(sequence, method):
@@ -76,7 +80,7 @@ def studied(monkeypatch, given: Study, **answers: Sequence[tuple[str, RigidTrans
         return Answers(tuple(frames), 1.5, 1, given.plan.bones["femur"].mesh)
 
     monkeypatch.setattr(recording, "follow", follow)
-    return study(given, list(answers))
+    return study(given, RecordedFrames(source, RIG, 15.0), list(answers))
 
 
 def shifted(x_mm: float) -> RigidTransform:
@@ -92,8 +96,8 @@ SAID = [
 def by_poses(monkeypatch, own: OwnError = NOT_STATED) -> Studied:
     # Of picture 106 nothing is known.
     poses = {"femur": {100 + n: shifted(0.0) for n in range(6)}}
-    given = a_study(GreySource(7), PoseTruth(poses, own))
-    return studied(monkeypatch, given, icp=SAID, bimcc=SAID)
+    given = a_study(PoseTruth(poses, own))
+    return studied(monkeypatch, given, GreySource(7), icp=SAID, bimcc=SAID)
 
 
 def row_of(one: Studied, method: str) -> RecordingRow:
@@ -140,8 +144,8 @@ def test_errors_by_touched_points(monkeypatch) -> None:
     divot = np.array([5.0, -3.0, 12.0])
     at = shifted(0.0).apply(divot)
     touched = tuple(Touch(number, "a", at) for number in (101, 102, 104))
-    given = a_study(GreySource(7), DivotTruth({"a": divot}, touched))
-    row = row_of(studied(monkeypatch, given, bimcc=SAID), "bimcc")
+    given = a_study(DivotTruth({"a": divot}, touched))
+    row = row_of(studied(monkeypatch, given, GreySource(7), bimcc=SAID), "bimcc")
     assert row.counted.errors_mm == pytest.approx([0.25, 3.0])
     assert row.known.n_frames == 3
     assert row.verdicts["LOST"].n_without_pose == 1
@@ -152,15 +156,15 @@ def test_errors_by_touched_points(monkeypatch) -> None:
 
 def test_touched_points_are_not_compared_with_the_bound(monkeypatch, tmp_path) -> None:
     touched = (Touch(101, "a", shifted(0.0).apply(np.zeros(3))),)
-    given = a_study(GreySource(7), DivotTruth({"a": np.zeros(3)}, touched))
-    write_report(tmp_path, [studied(monkeypatch, given, bimcc=SAID)])
+    given = a_study(DivotTruth({"a": np.zeros(3)}, touched))
+    write_report(tmp_path, [studied(monkeypatch, given, GreySource(7), bimcc=SAID)])
     page = (tmp_path / "report.html").read_text("utf-8")
     assert "error against bound" not in page
     assert page.count("<svg") == 1
 
 
 def test_a_frame_in_which_no_bone_was_looked_for_has_no_time(monkeypatch) -> None:
-    given = a_study(GreySource(3), PoseTruth({"femur": {101: shifted(0.0)}}, NOT_STATED))
+    given = a_study(PoseTruth({"femur": {101: shifted(0.0)}}, NOT_STATED))
     frames = (
         FrameAnswer(shifted(0.0), None, say("OK"), 20.0, is_search=True),
         FrameAnswer(None, None, None, 1.0, is_search=False),
@@ -168,27 +172,28 @@ def test_a_frame_in_which_no_bone_was_looked_for_has_no_time(monkeypatch) -> Non
     )
     mesh = PLAN.bones["femur"].mesh
     monkeypatch.setattr(recording, "follow", lambda *_: Answers(frames, 1.5, 1, mesh))
-    assert row_of(study(given, ["bimcc"]), "bimcc").fps == pytest.approx(25.0)
+    recorded = RecordedFrames(GreySource(3), RIG, 15.0)
+    assert row_of(study(given, recorded, ["bimcc"]), "bimcc").fps == pytest.approx(25.0)
 
 
-def tracked_study(seconds: float = 20.0, **changes) -> tuple[Study, list]:
-    """Of the two trackers' bone: the study, and what the camera's tracker says."""
-    data = track_twice(seconds=seconds)
+def tracked_study() -> tuple[Study, GreySource, list]:
+    """Of the two trackers' bone: study, pictures, and what the camera's tracker says."""
+    data = track_twice(seconds=20.0)
     source = GreySource(len(data.times_ns), data.times_ns)
-    truth = replace(data.truth, **changes)
     ball = sphere(30.0, 24)
     mesh = TriangleMesh(ball.vertices_mm + CENTRE_MM, ball.faces)
     plan = Plan({"femur": BoneModel("femur", mesh, "right")})
-    return a_study(source, truth, plan), [("OK", pose) for pose in data.poses]
+    return a_study(data.truth, plan), source, [("OK", pose) for pose in data.poses]
 
 
 def test_errors_by_another_tracker(monkeypatch) -> None:
-    given, said = tracked_study()
+    given, source, said = tracked_study()
     # What the judge refuses is not solved with, and is scored all the same.
-    since_s = to_seconds(given.frames.times_ns, given.frames.times_ns[0])
+    times_ns = RecordedFrames(source, RIG, 15.0).times_ns
+    since_s = to_seconds(times_ns, times_ns[0])
     refused = int(np.flatnonzero(split_halves(since_s).is_to_score)[5])
     said[refused] = ("LOST", said[refused][1].move([9.0, 0, 0, 0, 0, 0], np.zeros(3)))
-    one = studied(monkeypatch, given, bimcc=said)
+    one = studied(monkeypatch, given, source, bimcc=said)
     row = row_of(one, "bimcc")
     assert one.solved is not None
     assert refused + 100 in one.known
@@ -199,9 +204,9 @@ def test_errors_by_another_tracker(monkeypatch) -> None:
 
 
 def test_poses_that_are_not_ok_are_not_solved_with(monkeypatch) -> None:
-    given, said = tracked_study()
+    given, source, said = tracked_study()
     with pytest.raises(ResultError, match="OK pose"):
-        studied(monkeypatch, given, bimcc=[("DEGRADED", pose) for _, pose in said])
+        studied(monkeypatch, given, source, bimcc=[("DEGRADED", pose) for _, pose in said])
 
 
 def test_what_is_written(monkeypatch, tmp_path) -> None:
@@ -227,8 +232,8 @@ def test_what_is_written(monkeypatch, tmp_path) -> None:
 
 
 def test_the_report_says_what_another_tracker_can_show(monkeypatch, tmp_path) -> None:
-    given, said = tracked_study()
-    content = write_report(tmp_path, [studied(monkeypatch, given, bimcc=said)])
+    given, source, said = tracked_study()
+    content = write_report(tmp_path, [studied(monkeypatch, given, source, bimcc=said)])
     told = content["summary"]["recordings"]["bench/1"]["truth"]
     assert told["kind"] == "tracker"
     assert told["solved"]["by"] == "bimcc"
