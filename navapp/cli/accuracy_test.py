@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from navapp.config import Configuration
     from navapp.control.accuracy_test.testing import AccuracyTesting
     from navapp.devices.accuracy_test import SimulatedHand
-    from navapp.evaluation.localisation.figures import Scatter
+    from navapp.evaluation.accuracy_test.figures import Scatter
     from navapp.geometry.rig import StereoRig
     from navapp.geometry.transform import FloatArray
     from navapp.tools.tool import Tool
@@ -164,8 +164,8 @@ def _report(
     diagnostics: Diagnostics,
 ) -> None:
     """Tell, and write what was asked for."""
-    from navapp.evaluation.localisation.figures import measure_all
-    from navapp.evaluation.localisation.report import write_localisation_report
+    from navapp.evaluation.accuracy_test.figures import measure_all
+    from navapp.evaluation.accuracy_test.report import write_localisation_report
     from navapp.geometry.whole_files import write_whole
 
     figures, distances = measure_all(testing.taken, divots_mm)
@@ -209,7 +209,7 @@ def _compare_with_truth(
     testing: "AccuracyTesting", hand: "SimulatedHand | None"
 ) -> "Scatter | None":
     """Of a simulated test: distances of all tips from their divots."""
-    from navapp.evaluation.localisation.figures import Scatter
+    from navapp.evaluation.accuracy_test.figures import Scatter
 
     if hand is None:
         return None

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from navapp.cli.campaign_progress import CampaignProgress
 from navapp.cli.diagnostics import Diagnostics, check_writable, write_json
-from navapp.errors import UsageError
+from navapp.errors import InputError, UsageError
 
 if TYPE_CHECKING:
     from navapp.evaluation.campaign import Campaign, CampaignFolder
@@ -119,7 +119,14 @@ def run_and_write(
     progress = CampaignProgress(n_tests, n_processes, diagnostics)
     run_campaign(folder, settings, n_processes, progress.tell)
     folder.check_code()
-    content = write(folder)
+    try:
+        content = write(folder)
+    except OSError as error:
+        raise InputError(
+            f"the results cannot be written ({error.strerror})",
+            subject=str(folder.path),
+            remedy="make room or give access there, and run again: what is done is kept",
+        ) from error
     write_json(str(folder.path / file_name), "evaluate", content)
     write_json(options.json, "evaluate", content)
     return content

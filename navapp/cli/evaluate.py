@@ -100,6 +100,7 @@ def _run_tables(options: argparse.Namespace, diagnostics: Diagnostics) -> int:
     def write(folder: "CampaignFolder[CaseTest]") -> dict[str, Any]:
         if options.peers:
             run_peers(folder.path, settings.tests, diagnostics)
+            folder.check_code()
         return write_results(folder, settings)
 
     content = run_and_write(settings, write, "evaluate.json", options, diagnostics)

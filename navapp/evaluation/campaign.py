@@ -183,11 +183,13 @@ class CampaignFolder(Generic[T]):
         self.check_code()
         test = done.test
         kept = _TestFile(test.name, test.seed, done.machine, done.followed)
+        # A number that is none must not be read as "not known" later: it raises here.
+        content = _TEST_FILE.dump_python(kept)
         path = self.file_of(test, is_timed=is_timed)
         try:
             if picture is not None:
                 write_whole(self.picture_of(test), picture)
-            write_whole(path, _TEST_FILE.dump_json(kept) + b"\n")
+            write_whole(path, (json.dumps(content, allow_nan=False) + "\n").encode())
         except OSError as error:
             raise InputError(
                 f"{path} cannot be written ({error.strerror})",
@@ -292,14 +294,14 @@ def _check_same(folder: str | Path, kept: Any, wanted: Mapping[str, Any]) -> Non
     """Refuse to go on with another evaluation, or with other code."""
     if kept == wanted:
         return
-    begun_with = {} if not isinstance(kept, dict) else kept
-    for key, name in ((_SOURCE, "code of navapp"), (_LIBRARIES, "libraries")):
-        if {**begun_with, key: wanted[key]} == wanted:
-            raise UsageError(
-                f"{folder} was begun with other {name}",
-                subject=str(folder),
-                remedy="go on with these, or choose another --out",
-            )
+    of_code = {key: wanted[key] for key in (_SOURCE, _LIBRARIES)}
+    if isinstance(kept, dict) and {**kept, **of_code} == wanted:
+        other = "code of navapp" if kept.get(_SOURCE) != wanted[_SOURCE] else "libraries"
+        raise UsageError(
+            f"{folder} was begun with other {other}",
+            subject=str(folder),
+            remedy="go on with these, or choose another --out",
+        )
     raise UsageError(
         f"{folder} holds another evaluation",
         subject=str(folder),

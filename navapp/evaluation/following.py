@@ -127,6 +127,7 @@ def follow(
         )
         undo.callback(controller.close)
         surface = controller.snapshot.bone_surface or sequence.plan.bones[sequence.stage.bone].mesh
+        recorder.begin()
         run_headless(controller, operator)
         if controller.failure is not None:
             raise controller.failure
@@ -140,6 +141,10 @@ class _Recorder:
         self._frames: list[FrameAnswer] = []
         self._n_searches = 0  # that were made before the newest frame
         self._taken_s: list[float] = []  # when each frame was done
+        self._began_s = 0.0
+
+    def begin(self) -> None:
+        """Times count from now."""
         self._began_s = time.perf_counter()
 
     def take(self, result: FrameResult, operator: Follower) -> None:

@@ -29,6 +29,7 @@ def list_libraries() -> dict[str, str]:
     return {
         "Python": platform.python_version(),
         "numpy": np.__version__,
+        "scipy": version("scipy"),
         "numba": version("numba"),
         "OpenCV": cv2.__version__,
     }

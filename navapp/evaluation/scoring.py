@@ -53,7 +53,7 @@ class _Scorer:
             tre_mm=errors.tre_mm,
             displacement_mm=errors.displacement_mm,
             outline_mm=errors.outline_mm,
-            bound_mm=None if verdict is None else verdict.predicted_tre_mm,
+            bound_mm=None if verdict is None else _finite(verdict.predicted_tre_mm),
             seen=None if verdict is None else verdict.coverage,
             hidden=None if verdict is None else verdict.occluded_fraction,
             total_ms=answer.total_ms,
@@ -100,6 +100,11 @@ class _Scorer:
             self._rectifier,
             make_sensor(self._sequence.configuration.camera.simulated),
         )
+
+
+def _finite(bound_mm: float | None) -> float | None:
+    """None of a bound without end: nothing bounds that error."""
+    return None if bound_mm is None or math.isinf(bound_mm) else bound_mm
 
 
 def _find_rms_ratio(verdict: Verdict | None) -> float | None:

@@ -24,6 +24,9 @@ _MOST_VOXELS = 400_000
 _GRID_MARGIN_MM = 14.0
 _SMOOTHING_ROUNDS = 2
 _LEAST_SIGMA_MM = 1e-3
+# Widest kernel over the model's radius: 6 mm of a patella; from 36 mm on as wide as any is. Chosen;
+# compared in tests.bench.small_bones.
+_KERNEL_PER_RADIUS = 1.0 / 3.0
 
 
 class RegistrationModel:
@@ -131,6 +134,19 @@ class RegistrationModel:
             return self.points_mm[ConvexHull(self.points_mm).vertices]
         except QhullError:  # flat
             return self.points_mm
+
+    @cached_property
+    def radius_mm(self) -> float:
+        """Root mean square distance of the surface from the bone's centre."""
+        return float(np.sqrt(((self.points_mm - self.centre_mm) ** 2).sum(axis=1).mean()))
+
+    @property
+    def widest_kernel_mm(self) -> float:
+        """The widest kernel with which the bone is looked for in tissue.
+
+        A wider one pairs a small bone with what lies beside it (tests.bench.small_bones).
+        """
+        return _KERNEL_PER_RADIUS * self.radius_mm
 
     @cached_property
     def smooth_normals(self) -> FloatArray:

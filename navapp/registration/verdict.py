@@ -67,6 +67,7 @@ class Evidence:
     dark_fraction: float = math.nan  # of the darker picture
     saturated_fraction: float = math.nan  # of the brighter picture
     detail_ratio: float = math.nan  # sharper over blurred picture; 0 when light already tells
+    smoothness: float = math.nan  # of the less sharp picture (`stereo.PictureHealth`)
     has_lost_rows: bool = False  # too large a vertical disparity to be measured
     row_error_mm: float = 0.0  # in depth, that a sure vertical disparity stands for
     rms_ratio: float = math.nan  # rms of the fit's residuals over the one predicted
@@ -173,6 +174,8 @@ RULES = (
          lambda e: e.saturated_fraction, UNUSABLE_FRACTION, None, CHOSEN),
     Rule(Reason.PICTURES_UNLIKE, "detail of one picture over the other's",
          lambda e: e.detail_ratio, 2.0, None, CHOSEN),
+    Rule(Reason.PICTURES_BLURRED, "growth of differences from 4 to 8 rows over that from 2 to 4",
+         lambda e: e.smoothness, 2.9, None, "chosen; compared in tests.bench.defocus"),
     Rule(Reason.ROWS_DISAGREE, "rows too far apart to be compared (yes 1)",
          lambda e: e.has_lost_rows, 0, None, _HEALTH),
     Rule(Reason.ROWS_DISAGREE, "depth error that the rows' offset or stretch stands for, mm",

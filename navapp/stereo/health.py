@@ -8,6 +8,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from navapp.geometry.box import Box
 from navapp.geometry.rectification import Image, RectifiedPair
@@ -29,6 +30,8 @@ _LEAST_CORRELATION = 0.7
 # Texture of a twentieth is below one grey level here; and what a sensor clips to.
 _DARK_LEVEL, _SATURATED_LEVEL = 16, 250
 _ROWS_APART, _COLUMNS_APART = 2, 4
+# Differences that grow with the distance by so many standard errors show more than noise; chosen.
+_SURE_ERRORS = 10.0
 _STRETCH_ROUNDS = 3
 # Row offsets of many points that go together: highlights lie elsewhere in both pictures.
 _ALIKE_PX = 0.05
@@ -43,6 +46,10 @@ class PictureHealth:
     dark_fraction: float  # of pixels too dark to show a bone's texture
     saturated_fraction: float  # of pixels that the sensor clipped
     detail: float  # rms difference of pixels two rows apart over the mean grey level
+    # By how much the mean squared difference of pixels grows from four to eight rows apart, over
+    # its growth from two to four: 4 where nothing is finer than eight rows, 2 or less in focus.
+    # White noise and contrast cancel out. NaN where it grows by no more than chance.
+    smoothness: float = math.nan
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,14 +147,27 @@ def _fit_stretch(offsets_px: FloatArray, places_px: FloatArray) -> tuple[float, 
 def _picture_health(picture: Image, box: Box) -> PictureHealth:
     """Of the part of the box that lies in the picture; of nothing, all dark."""
     inside = box.clip(picture.shape[1], picture.shape[0])
-    part = picture[inside.slices][::_ROWS_APART, ::_COLUMNS_APART]
+    part = picture[inside.slices][::_ROWS_APART, ::_COLUMNS_APART].astype(np.float32)
     if part.size == 0 or part.shape[0] < 2:
         return PictureHealth(1.0, 0.0, 0.0)
-    part = part.astype(np.float32)
-    step = (part[1:] - part[:-1]).ravel()
-    rms = math.sqrt(float(step @ step) / len(step))
     return PictureHealth(
         np.count_nonzero(part < _DARK_LEVEL) / part.size,
         np.count_nonzero(part >= _SATURATED_LEVEL) / part.size,
-        rms / max(float(part.mean()), 1.0),
+        math.sqrt(_mean_square_step(part, 1)) / max(float(part.mean()), 1.0),
+        _measure_smoothness(part),
     )
+
+
+def _measure_smoothness(part: NDArray[np.float32]) -> float:
+    """As of `PictureHealth`; `part` has every second row."""
+    if part.shape[0] <= 4:
+        return math.nan
+    near, middle, far = (_mean_square_step(part, n_rows) for n_rows in (1, 2, 4))
+    # Of noise alone the mean square of n differences has this standard error, nearly.
+    error = near * math.sqrt(2.0 / part.size)
+    return (far - middle) / (middle - near) if middle - near > _SURE_ERRORS * error else math.nan
+
+
+def _mean_square_step(part: NDArray[np.float32], n_rows: int) -> float:
+    step = (part[n_rows:] - part[:-n_rows]).ravel()
+    return float(step @ step) / len(step)

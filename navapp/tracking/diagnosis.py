@@ -14,7 +14,7 @@ from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.registration import fit_bimcc, make_near_starts, select_poses
 from navapp.registration.multi_start import AMBIGUOUS_FRACTION
 from navapp.stereo import are_swapped
-from navapp.tracking.frame import FREE_SETTINGS, Fit, ignore
+from navapp.tracking.frame import FREE_SETTINGS, Fit, ignore, limit_kernel
 from navapp.tracking.scoring import FitScorer
 from navapp.tracking.surface_meter import WIDE_VIEW, Measurement, SurfaceMeter
 from navapp.values import DisparityMap, Reason, Status, StereoPictures, TrackedFrame
@@ -94,8 +94,9 @@ class Diagnosis:
         starts = make_near_starts(start, start.apply(self._meter.model.centre_mm))
         found = self._scorer.find_poses(measured, starts, lambda _: on_progress(1.0))
         model = self._meter.model
+        settings = limit_kernel(FREE_SETTINGS, model)
         fits = [
-            Fit(fit_bimcc(measured.scene, model, pose, FREE_SETTINGS), measured)
+            Fit(fit_bimcc(measured.scene, model, pose, settings), measured)
             for pose in select_poses(found)
         ]
         return max(fits, key=self._scorer.score, default=None)

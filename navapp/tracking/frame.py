@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 from navapp.geometry.rectification import RectifiedPair
 from navapp.geometry.transform import FloatArray, RigidTransform
-from navapp.registration import BimccSettings
+from navapp.registration import BimccSettings, RegistrationModel
 from navapp.registration.step_kernels import noise_under_kernel_mm2
 from navapp.tracking.checks import PairChecks
 from navapp.tracking.row_times import RowTimes
@@ -25,6 +25,12 @@ NOISE_VARIANCE_RATIO = 0.57**2
 # Up to this, what residuals show beyond the noise is no sign of a misfit. Chosen: right poses of
 # glossy bones show more than femurs.
 TOLERATED_VARIANCE_RATIO = 0.65**2
+
+
+def limit_kernel(settings: BimccSettings, model: RegistrationModel) -> BimccSettings:
+    """Settings for a model that may be small: no kernel wider than finds it in tissue."""
+    return settings._replace(widest_mm=min(settings.widest_mm, model.widest_kernel_mm))
+
 
 OnMeasured = Callable[[Measurement, RigidTransform], object]
 

@@ -41,6 +41,15 @@ from navapp.values import (
 # their standard deviations.
 _COMMON_ERROR_SIGMAS = 2.0
 _SURE_SIGMAS = 3.0
+# Pictures that say nothing of the rig.
+_UNUSABLE = frozenset(
+    {
+        Reason.PICTURE_DARK,
+        Reason.PICTURE_OVEREXPOSED,
+        Reason.PICTURES_UNLIKE,
+        Reason.PICTURES_BLURRED,
+    }
+)
 # A model that the outline moved by no more looks as it was matched; a follower allows as much.
 _SAME_VIEW_MM = RestSettings().near_mm
 # About so many targets are used for the predicted error; for time alone.
@@ -206,6 +215,7 @@ class PoseJudge:
             dark_fraction=dark,
             saturated_fraction=saturated,
             detail_ratio=detail_ratio,
+            smoothness=float(np.fmax(health.left.smoothness, health.right.smoothness)),
             has_lost_rows=health.has_lost_rows,
             row_error_mm=max(offset_mm, stretch_mm),
             is_rig_accepted=self._is_rig_accepted,
@@ -283,8 +293,7 @@ def _sure(value: float, sigma: float) -> float:
 
 def _check_rows(health: StereoHealth, evidence: Evidence, verdict: Verdict) -> RowCheck | None:
     """What a pair says of its rig; None when its pictures or its points are too poor to tell."""
-    light = (Reason.PICTURE_DARK, Reason.PICTURE_OVEREXPOSED, Reason.PICTURES_UNLIKE)
-    is_poor = math.isnan(health.row_offset_px) or not set(light).isdisjoint(verdict.reasons)
+    is_poor = math.isnan(health.row_offset_px) or not _UNUSABLE.isdisjoint(verdict.reasons)
     return None if is_poor else RowCheck(health.row_offset_px, evidence.row_error_mm > OK_ERROR_MM)
 
 

@@ -4,9 +4,10 @@ from collections.abc import Sequence
 
 from navapp.geometry.transform import RigidTransform
 from navapp.registration import ScoredPose, find_poses, rank_fits
+from navapp.registration.multi_start import NEAR_SETTINGS
 from navapp.registration.verdict import Agreement, is_bone_absent
 from navapp.tracking.agreement import compare
-from navapp.tracking.frame import Fit, ignore
+from navapp.tracking.frame import Fit, ignore, limit_kernel
 from navapp.tracking.surface_meter import Measurement, SurfaceMeter
 from navapp.values.progress import Progress
 
@@ -47,6 +48,7 @@ class FitScorer:
             starts,
             lambda pose: self.explain(pose, measured),
             on_progress,
+            limit_kernel(NEAR_SETTINGS, self._meter.model),
         )
 
     def _compare(self, pose: RigidTransform, measured: Measurement) -> Agreement:

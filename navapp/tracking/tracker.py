@@ -104,8 +104,8 @@ class Tracker(ABC):
         frame = self.begin_predicted(pictures, state)
         best = self.look_near(frame, goal)
         tracked, after = self.update(best.with_cause(state.cause), state, frame)
-        # Nothing was searched for, so the next search is due at once.
-        return tracked, replace(after, n_doubted=0)
+        # Nothing was searched for: where it is in doubt, the next search is due at once.
+        return tracked, replace(after, n_doubted=min(after.n_doubted, 1))
 
     def look_near(self, frame: Frame, goal: Goal) -> TrackedFrame:
         """The bone near the start of a frame, without any search."""

@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 from importlib.metadata import distributions
 from pathlib import Path
 
+from navapp.environment import source_hash
 from navapp.evaluation.following import follow
 from navapp.evaluation.paper.settings import TableSettings
 from navapp.evaluation.peers.scores import PeerFrame, PeerTest, read_peers, write_peers
@@ -53,9 +54,9 @@ def main(argument: str) -> None:
 
 
 def find_code() -> str:
-    """Hash of all that the peers' answers depend on: their files and the libraries' versions."""
+    """Hash of all that the peers' answers depend on: navapp, their files, the libraries."""
     here = Path(__file__).resolve().parent
-    digest = hashlib.sha256()
+    digest = hashlib.sha256(source_hash().encode())
     for path in [*sorted(here.glob("peer_*.py")), *sorted((here / "visp").iterdir())]:
         if path.is_file():
             digest.update(path.read_bytes())

@@ -32,7 +32,10 @@ from tests.recorded import read_frames
 
 OFFSETS_PX = (0.0, 0.15, 0.3, 0.5, -0.5, 1.0)
 # Of a pair's pictures, beside its rows.
-OF_LIGHT = {Reason.PICTURE_DARK, Reason.PICTURE_OVEREXPOSED, Reason.PICTURES_UNLIKE}
+OF_LIGHT = {
+    Reason.PICTURE_DARK, Reason.PICTURE_OVEREXPOSED, Reason.PICTURES_UNLIKE,
+    Reason.PICTURES_BLURRED,
+}  # fmt: skip
 _NO_TARGETS = np.empty((0, 3))
 
 

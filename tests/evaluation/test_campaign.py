@@ -287,6 +287,14 @@ def test_a_test_is_read_as_it_was_kept(tmp_path) -> None:
     assert kept == Done(test, {"paper": one, "bimcc": one}, "a computer")
 
 
+def test_a_number_that_is_none_is_not_kept_as_unknown(tmp_path) -> None:
+    folder = CampaignFolder(tmp_path, SETTINGS)
+    bad = followed(score(float("nan")))
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        folder.write(Done(SETTINGS.tests[0], {"paper": bad, "bimcc": bad}), is_timed=False)
+    assert list((tmp_path / "tests").iterdir()) == []
+
+
 def test_damaged_settings_are_told(tmp_path) -> None:
     CampaignFolder(tmp_path, SETTINGS)
     (tmp_path / "settings.json").write_text("{")

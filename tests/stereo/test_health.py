@@ -1,3 +1,4 @@
+import math
 from dataclasses import replace
 
 import cv2
@@ -135,6 +136,44 @@ def test_a_blurred_picture_has_less_detail() -> None:
     same = measure_health(good, matched(), DISPARITY_PX)
     assert same.right.detail == pytest.approx(same.left.detail, rel=0.05)
     assert health.right.detail < 0.5 * health.left.detail
+
+
+@pytest.mark.parametrize(("noise", "contrast"), [(0.0, 1.0), (3.0, 1.0), (1.5, 0.3)])
+def test_smoothness_tells_a_blur_whatever_the_noise_and_the_contrast(noise, contrast) -> None:
+    rng = np.random.default_rng(5)
+    white = rng.normal(0.0, 1.0, (HEIGHT, WIDTH))
+
+    def measure(blur_px: float) -> float:
+        texture_of = cv2.GaussianBlur(white, (0, 0), blur_px)
+        seen = 128.0 + 30.0 * contrast * texture_of / texture_of.std()
+        picture = (seen + rng.normal(0.0, noise, seen.shape)).clip(0, 255).astype(np.uint8)
+        both = replace(pair(), left=picture, right=picture)
+        return measure_health(both, None, DISPARITY_PX).left.smoothness
+
+    # Of white texture: V(d) = 1 - exp(-d^2 / 4 b^2) at rows d apart.
+    for blur_px, limits in (
+        (1.5, (0.2, 0.6)),
+        (2.0, (0.6, 1.2)),
+        (4.0, (2.2, 2.8)),
+        (8.0, (3.3, 4.1)),
+    ):
+        assert limits[0] < measure(blur_px) < limits[1], blur_px
+
+
+@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("blur_px", [0.0, 0.4])
+def test_noise_and_texture_as_fine_are_not_smooth(seed, blur_px) -> None:
+    rng = np.random.default_rng(seed)
+    fine = cv2.GaussianBlur(rng.normal(0.0, 4.0, (HEIGHT, WIDTH)), (0, 0), max(blur_px, 1e-3))
+    picture = (90.0 + fine).clip(0, 255).astype(np.uint8)
+    health = measure_health(replace(pair(), left=picture, right=picture), None, DISPARITY_PX)
+    assert not health.left.smoothness > 1.0, "not known, or small"
+
+
+def test_smoothness_is_not_known_of_a_flat_picture() -> None:
+    flat = np.full((HEIGHT, WIDTH), 90, np.uint8)
+    health = measure_health(replace(pair(), left=flat, right=flat), None, DISPARITY_PX)
+    assert math.isnan(health.left.smoothness)
 
 
 def test_light_and_gain_do_not_change_the_detail() -> None:

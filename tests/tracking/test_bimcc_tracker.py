@@ -275,7 +275,9 @@ def test_a_doubt_at_a_glance_puts_off_no_search() -> None:
     assert not state.update(found, 0, tracker.model.centre_mm).is_search_due
 
 
-@pytest.mark.parametrize(("n_doubted", "is_due"), [(0, True), (2, True), (3, False), (5, False)])
+@pytest.mark.parametrize(
+    ("n_doubted", "is_due"), [(0, False), (1, True), (2, True), (3, False), (5, False)]
+)
 def test_a_doubted_place_is_compared_with_others_ever_more_rarely(
     n_doubted: int, is_due: bool
 ) -> None:
@@ -352,7 +354,7 @@ def test_what_a_search_for_a_buried_bone_finds_takes_no_place_of_an_equal_answer
     tracker.near = SimpleNamespace(find=lambda frame: ["near"])
     tracker.buried = SimpleNamespace(find=lambda frame: ["buried"])
     tracker.highlights = SimpleNamespace(find=lambda *given: [])
-    state = TrackState.at_rest(a.truth(a.frames[0]), 0)
+    state = replace(TrackState.at_rest(a.truth(a.frames[0]), 0), n_doubted=1)
     frame = tracker.begin_predicted(a.frames[0], state)
     assert tracker._follow(frame, state, GOAL) is judge.answers[0]
     assert judge.fits == ["near", "buried"]

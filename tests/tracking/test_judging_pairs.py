@@ -65,7 +65,9 @@ def test_rows_are_doubted_only_beyond_their_own_noise() -> None:
         (PictureHealth(0.8, 0.0, 0.2), Reason.PICTURE_DARK),
         (PictureHealth(0.0, 0.8, 0.01), Reason.PICTURE_OVEREXPOSED),
         (PictureHealth(0.0, 0.0, 0.07), Reason.PICTURES_UNLIKE),
+        (PictureHealth(0.0, 0.0, 0.15, 3.0), Reason.PICTURES_BLURRED),
         (PictureHealth(0.6, 0.3, 0.14), None),
+        (PictureHealth(0.0, 0.0, 0.15, 2.8), None),
     ],
 )
 def test_an_unusable_picture_is_named(bad: PictureHealth, reason: Reason | None) -> None:
@@ -88,8 +90,9 @@ def test_usable_pairs_say_how_their_rows_stand() -> None:
         StereoHealth(GOOD, GOOD, n_points=90, correlation=0.1),
         StereoHealth(PictureHealth(0.8, 0.0, 0.2), GOOD, 3.0 * LIMIT_PX, 0.01, 100),
         StereoHealth(GOOD, PictureHealth(0.0, 0.0, 0.07), 3.0 * LIMIT_PX, 0.01, 100),
+        StereoHealth(GOOD, PictureHealth(0.0, 0.0, 0.15, 3.0), 3.0 * LIMIT_PX, 0.01, 100),
     ],
-    ids=["few points", "lost rows", "dark", "unlike"],
+    ids=["few points", "lost rows", "dark", "unlike", "blurred"],
 )
 def test_poor_pairs_say_nothing_of_the_rig(health: StereoHealth) -> None:
     assert judged_right(health).rows is None
@@ -101,6 +104,7 @@ def tracked(tracker: BimccTracker, *, dark: str = "") -> tuple[Status, tuple[Rea
     if dark:
         frame = replace(frame, **{dark: np.zeros_like(frame.left)})
     state = TrackState.at_rest(a.truth(frame), frame.captured_ns)
+    state = replace(state, n_doubted=1)  # a search is due
     verdict = tracker.track(frame, state, GOAL)[0].verdict
     return verdict.status, verdict.reasons
 

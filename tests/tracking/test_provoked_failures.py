@@ -2,10 +2,14 @@
 
 from functools import lru_cache
 
+import numpy as np
 import pytest
 
-from navapp.tracking import Tracker, make_tracker
-from navapp.values import Reason
+from navapp.config import Configuration
+from navapp.config.camera_sections import CameraSection, SimulationSection
+from navapp.evaluation.sequence import render_room
+from navapp.tracking import Goal, Tracker, TrackState, make_tracker
+from navapp.values import Reason, Status
 from tests.bench.provoked import Event, Shown, Theatre, played
 from tests.bench.provoked_failures import back_after_s
 from tests.many import few_of
@@ -47,6 +51,39 @@ def test_what_goes_wrong_shows_no_wrong_pose_and_is_over_soon(name: str) -> None
         if event.is_on(one.time_s) and (event.blocked or event.light < 1.0):
             assert not one.is_ok
             assert one.tracked.verdict.reasons[0] is Reason.PICTURE_DARK
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("defocus_px", few_of([4.0, 6.0]))
+def test_what_is_out_of_focus_is_never_shown(defocus_px: float) -> None:
+    settings = SimulationSection(seed=2_400_001, stepped=True, defocus_px=defocus_px)
+    configuration = Configuration(camera=CameraSection(simulated=settings))
+    sequence = render_room(configuration, "opening", 1)
+    tracker = make_tracker(sequence.rig, sequence.plan.bones["femur"])
+    state = TrackState.at_rest(sequence.truth[0], sequence.frames[0].captured_ns)
+    goal = Goal(sequence.plan.targets_of(sequence.stage.targets), sequence.stage.tolerance_mm)
+    found, _ = tracker.track(sequence.frames[0], state, goal)
+    assert Reason.PICTURES_BLURRED in found.verdict.reasons
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", few_of([2_100_030, 2_100_058, 2_100_093]))
+def test_a_patella_among_tissue_is_found_from_its_rough_pose(seed: int) -> None:
+    simulated = SimulationSection(
+        seed=seed,
+        side="left" if seed % 2 else "right",
+        sex="female" if seed // 2 % 2 else "male",
+        age_group="middle" if seed // 4 % 2 else "young",
+        stepped=True,
+    )
+    sequence = render_room(Configuration(camera=CameraSection(simulated=simulated)), "patella", 1)
+    tracker = make_tracker(sequence.rig, sequence.plan.bones["patella"])
+    targets_mm = sequence.plan.targets_of(sequence.stage.targets)
+    goal = Goal(targets_mm, sequence.stage.tolerance_mm)
+    found = tracker.register(sequence.frames[0], sequence.prior, goal)[0]
+    assert found.verdict.status is Status.OK
+    off_mm = found.left_from_bone.apply(targets_mm) - sequence.truth[0].apply(targets_mm)
+    assert np.linalg.norm(off_mm, axis=1).mean() < 0.5
 
 
 @pytest.mark.release

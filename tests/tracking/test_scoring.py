@@ -1,11 +1,14 @@
 """How much of the model a fit explains, and what that says of several."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from navapp.registration import ScoredPose, rank_fits, select_poses
+from navapp.registration.multi_start import NEAR_SETTINGS
+from navapp.tracking import scoring
 from navapp.tracking.frame import Fit
 from navapp.tracking.scoring import FitScorer
 from navapp.tracking.surface_meter import NEAR_BOX, WIDE_VIEW
@@ -26,6 +29,18 @@ def found_at_the_truth() -> Fit:
 def turned(fit: Fit, turn_rad: float) -> Fit:
     pose = fit.pose.move((0, 0, 0, 0, 0, turn_rad), fit.pose.apply(room().tracker.model.centre_mm))
     return replace(fit, estimate=replace(fit.estimate, camera_from_bone=pose))
+
+
+def test_a_small_bone_is_looked_for_with_a_narrow_kernel(monkeypatch) -> None:
+    asked = []
+    monkeypatch.setattr(scoring, "find_poses", lambda *given: asked.append(given[-1]) or [])
+    tracker = room().tracker
+    measured = SimpleNamespace(scene=None)
+    tracker.scorer.find_poses(measured, [])
+    assert asked.pop().widest_mm == NEAR_SETTINGS.widest_mm, "a femur is large"
+    monkeypatch.setattr(tracker.model, "radius_mm", 18.0)
+    tracker.scorer.find_poses(measured, [])
+    assert asked.pop().widest_mm == pytest.approx(6.0)
 
 
 def test_a_different_pose_that_explains_as_much_makes_the_best_a_guess() -> None:

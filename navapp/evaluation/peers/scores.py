@@ -1,5 +1,6 @@
 """Results of other people's trackers, and the files that keep them."""
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -54,7 +55,8 @@ def write_peers(folder: Path, done: PeerTest) -> None:
     path = file_of(folder, done.test)
     path.parent.mkdir(exist_ok=True)
     kept = _PeerFile(done.test.name, done.test.seed, done.code, done.frames)
-    write_whole(path, _PEER_FILE.dump_json(kept) + b"\n")
+    content = json.dumps(_PEER_FILE.dump_python(kept), allow_nan=False)
+    write_whole(path, (content + "\n").encode())
 
 
 def read_peers(folder: Path, tests: Sequence[CaseTest]) -> list[PeerTest]:

@@ -196,7 +196,7 @@ AXES: dict[str, Axis] = {
     axis.name: axis for axis in (*_CAUSES, *_PICTURE_AXES, *_PLAN_AXES, *_RIG_AXES)
 }
 # No test and no choice of a constant uses the seeds from here on; so many belong to an axis.
-FIRST_STRESS_SEED, MOST_KNEES = 96_001, 100
+FIRST_STRESS_SEED, MOST_KNEES = 136_001, 100
 
 
 def find_seed(axis: Axis, knee: int, first_seed: int) -> int:

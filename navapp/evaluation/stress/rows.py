@@ -60,6 +60,8 @@ class LevelRow:
             "tre_mm": self.tre_mm,
             "worst_mm": self.worst_mm,
             "tre_any_mm": self.tre_any_mm,
+            "n_frames_all": self.every.n_frames,
+            "n_ok_all": self.every.n_ok,
             "n_wrong": self.every.n_wrong,
             "coverage": self.figures.bound_coverage,
             "reason": self.reason,

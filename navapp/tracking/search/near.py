@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from navapp.geometry.transform import RigidTransform
 from navapp.registration import BimccSettings, fit_bimcc
 from navapp.tracking.following import Follower
-from navapp.tracking.frame import FREE_SETTINGS, Fit, Frame, ignore
+from navapp.tracking.frame import FREE_SETTINGS, Fit, Frame, ignore, limit_kernel
 from navapp.tracking.surface_meter import NEAR_BOX, Margins, Measurement, SurfaceMeter
 
 _NEARBY_SETTINGS = FREE_SETTINGS._replace(widest_mm=3.0)
@@ -66,7 +66,8 @@ class NearSearch:
         frame.watch.lap("stereo")
         if measured is None:
             return None
-        far = self._fit(frame, measured, frame.start, FREE_SETTINGS)
+        settings = limit_kernel(FREE_SETTINGS, self._meter.model)
+        far = self._fit(frame, measured, frame.start, settings)
         is_on_model = far.measured.rendered is not None
         if is_on_model and far.measured.matched_fraction >= SURE_FRACTION:
             return far

@@ -2,10 +2,12 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.tracking.frame import Fit, Frame
+from navapp.tracking.search import buried
 from navapp.tracking.surface_meter import WIDE_BOX
 from navapp.values import Prior, Status
 from tests.tracking.rooms import GOAL, Room, room
@@ -42,6 +44,17 @@ def test_it_looks_around_a_prediction_from_which_nothing_answers() -> None:
     frame = off(a, (1.6, -1.2, 1.4, 0.02, -0.02, 0.01))
     (best,) = a.tracker.buried.find(frame)
     assert error_mm(a, best) < 0.2
+
+
+def test_both_threads_find_what_one_alone_finds(monkeypatch) -> None:
+    a = room()
+    frame = off(a, (0.8, -0.6, 0.7, 0.01, -0.01, 0.005))
+    places = a.tracker.buried._step_from(frame, [frame.start] * 3)
+    monkeypatch.setattr(buried, "map_both", lambda job, items, _: [job(item) for item in items])
+    alone = a.tracker.buried._step_from(frame, [frame.start] * 3)
+    assert [place.score for place in places] == [place.score for place in alone]
+    for one, other in zip(places, alone, strict=True):
+        np.testing.assert_array_equal(one.fit.pose.matrix, other.fit.pose.matrix)
 
 
 class Asked:

@@ -10,6 +10,7 @@ import pytest
 from navapp.geometry.transform import RigidTransform
 from navapp.tracking.frame import Fit, Frame
 from navapp.tracking.scoring import FitScorer
+from navapp.tracking.search import near
 from navapp.tracking.search.near import LEAST_FRACTION, SURE_FRACTION, NearSearch
 from navapp.tracking.surface_meter import NEAR_BOX, WIDE_BOX, Margins
 from navapp.values import Reason
@@ -235,3 +236,18 @@ def test_a_dark_pair_gives_no_pose_of_its_own() -> None:
     fit = find(search, replace(frame, pair=replace(frame.pair, left=black, right=black)))
     assert asked.count("measure_freely") == 1
     assert Reason.TOO_FEW_POINTS in fit.estimate.reasons
+
+
+def test_a_small_bone_is_fitted_freely_with_a_narrow_kernel(monkeypatch) -> None:
+    a, asked = room(), []
+    fit = near.fit_bimcc
+
+    def note(scene, model, start, settings):
+        asked.append(settings.widest_mm)
+        return fit(scene, model, start, settings)
+
+    monkeypatch.setattr(near, "fit_bimcc", note)
+    monkeypatch.setattr(a.tracker.model, "radius_mm", 18.0)
+    frame = a.tracker.begin(a.frames[0], a.truth(a.frames[0]))
+    a.tracker.near.find_freely(frame, WIDE_BOX)
+    assert asked[0] == pytest.approx(6.0)

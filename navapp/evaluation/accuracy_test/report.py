@@ -10,7 +10,7 @@ import numpy as np
 from calibration.report.page import make_html, make_note
 from calibration.report.plots import BLUE, ORANGE, draw_svg
 from navapp.control.accuracy_test.states import TakenTip
-from navapp.evaluation.localisation.figures import PlaceFigures, Scatter, find_length_errors
+from navapp.evaluation.accuracy_test.figures import PlaceFigures, Scatter, find_length_errors
 from navapp.geometry.transform import FloatArray
 from navapp.geometry.whole_files import write_whole
 

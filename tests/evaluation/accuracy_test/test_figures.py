@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from navapp.control.accuracy_test.states import TakenTip
-from navapp.evaluation.localisation.figures import (
+from navapp.evaluation.accuracy_test.figures import (
     find_length_errors,
     measure_all,
     measure_lengths,
     measure_scatter,
 )
-from navapp.evaluation.localisation.report import write_localisation_report
+from navapp.evaluation.accuracy_test.report import write_localisation_report
 from navapp.geometry.transform import rotation_from_vector
 from navapp.tools.accuracy_tasks import AXES, Task
 
