@@ -22,14 +22,14 @@ from drivers.frames import StereoFrame
 from navapp.control.stages import STAGES, stage_by_name
 from navapp.evaluation.paper.cases import SituationName
 from navapp.evaluation.sequence import KnownSequence
-from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import FloatArray, RigidTransform
 from navapp.registration.verdict import RULES, Evidence, Goal, Rule, decide
 from navapp.tracking import TrackState, judging
 from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.values import BoneModel, Reason, Status, Verdict
 from tests.bench.bounds import FIRST_SEED, render_knee
-from tests.bench.wrong_sizes import find_bone_as_made, stretch_bone
+from tests.bench.wrong_bones import OTHER_SIDE, move_onto, stretch_bone, stretch_points
+from tests.bench.wrong_sizes import find_bone_as_made
 
 _OTHER_SEED = FIRST_SEED + 500
 # Rules that tell a right place from a wrong one; the others hold promises (errors in mm), or ask
@@ -132,12 +132,9 @@ def _wrong_bones(
     own: BoneModel, targets_mm: FloatArray, other: BoneModel
 ) -> Iterator[tuple[BoneModel, FloatArray]]:
     """Wrong plans of a bone, with its targets in them."""
-    to_own_mm = own.mesh.centroid_mm - other.mesh.centroid_mm
-    elsewhere = TriangleMesh(other.mesh.vertices_mm + to_own_mm, other.mesh.faces)
-    yield replace(other, mesh=elsewhere), targets_mm
-    yield stretch_bone(own, targets_mm, np.array([-1.0, 1.0, 1.0]))
-    for size in _SIZES:
-        yield stretch_bone(own, targets_mm, np.full(3, size))
+    yield replace(other, mesh=move_onto(other.mesh, own.mesh)), targets_mm
+    for factors in (OTHER_SIDE, *_SIZES):
+        yield stretch_bone(own, factors), stretch_points(targets_mm, own.mesh, factors)
 
 
 def _follow(

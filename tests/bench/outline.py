@@ -12,13 +12,12 @@ and for bones of another size. The truth only starts and scores.
 import argparse
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from navapp.evaluation import compute_mean_tre_mm
-from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import RigidTransform
 from navapp.geometry.zbuffer import RenderedView
 from navapp.tracking.edge_kernels import (
@@ -29,9 +28,9 @@ from navapp.tracking.edge_kernels import (
 from navapp.tracking.frame import Fit, Frame
 from navapp.tracking.outline_kernels import Eye, Rim, find_rim, is_outline, thin_rim
 from navapp.tracking.surface_meter import NEAR_BOX
-from navapp.values import BoneModel
 from tests.bench.first_registration import Case, simulated
 from tests.bench.tracker_parts import TrackerParts
+from tests.bench.wrong_bones import stretch_bone
 
 DARKER = (0.0, 0.3, 0.5, 0.6, 0.7, 0.8, 1.01)
 NEAR_PX = 0.5
@@ -63,7 +62,7 @@ def main() -> int:
         edges += edges_of(case, parts)
         rows += joined(case, parts, seed)
         for size in SIZES:
-            sized = parts if size == 1.0 else TrackerParts(case.rig, _sized(case.bone, size))
+            sized = parts if size == 1.0 else TrackerParts(case.rig, stretch_bone(case.bone, size))
             shares[size] += near_shares(case, sized, seed)
     print("| darker behind by | edges | within 0.5 px | median px | MAD px |")
     print("|---|---|---|---|---|")
@@ -82,12 +81,6 @@ def main() -> int:
         least = min(found, default=np.nan)
         print(f"| x {size:g} | {len(found)} | {np.median(found):.2f} | {least:.2f} |")
     return 0
-
-
-def _sized(bone: BoneModel, size: float) -> BoneModel:
-    centre_mm = bone.mesh.centroid_mm
-    scaled_mm = centre_mm + size * (bone.mesh.vertices_mm - centre_mm)
-    return replace(bone, mesh=TriangleMesh(scaled_mm, bone.mesh.faces))
 
 
 def edges_of(case: Case, parts: TrackerParts) -> Iterator[Edge]:

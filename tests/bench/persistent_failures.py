@@ -26,6 +26,7 @@ from sim_devices.scenario import Scenario
 from sim_devices.sensor import SensorModel
 from sim_devices.world import World
 from tests.bench.provoked import GOAL
+from tests.bench.wrong_bones import OTHER_SIDE, move_onto, stretch_bone
 from tests.knees import femur_of, stepped_camera
 
 # Not the seeds of any test or default, nor of the other benches.
@@ -82,10 +83,7 @@ def _other_person(room: Room) -> BoneModel:
 
 
 def _other_side(room: Room) -> BoneModel:
-    mesh = room.bone.mesh
-    centre_mm = mesh.centroid_mm
-    mirrored = (mesh.vertices_mm - centre_mm) * np.array([-1.0, 1.0, 1.0]) + centre_mm
-    return BoneModel("femur", TriangleMesh(mirrored, mesh.faces[:, ::-1]), room.bone.side)
+    return stretch_bone(room.bone, OTHER_SIDE)
 
 
 def _tibia(room: Room) -> BoneModel:
@@ -93,18 +91,11 @@ def _tibia(room: Room) -> BoneModel:
 
 
 def _sized(size: float) -> Callable[[Room], BoneModel]:
-    def plan(room: Room) -> BoneModel:
-        mesh = room.bone.mesh
-        scaled = mesh.centroid_mm + size * (mesh.vertices_mm - mesh.centroid_mm)
-        return BoneModel("femur", TriangleMesh(scaled, mesh.faces), room.bone.side)
-
-    return plan
+    return lambda room: stretch_bone(room.bone, size)
 
 
 def _moved_onto(own: BoneModel, other: TriangleMesh) -> BoneModel:
-    """Another bone, its middle where that of the own one lies."""
-    shift = own.mesh.centroid_mm - other.centroid_mm
-    return BoneModel("femur", TriangleMesh(other.vertices_mm + shift, other.faces), own.side)
+    return BoneModel("femur", move_onto(other, own.mesh), own.side)
 
 
 PLANS: dict[str, Callable[[Room], BoneModel]] = {

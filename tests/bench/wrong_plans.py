@@ -22,6 +22,7 @@ import numpy as np
 from navapp.cli.main import run
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.ply import read_ply, write_ply
+from tests.bench.wrong_bones import OTHER_SIDE, stretch
 
 _OTHERS = ("femur_1", "femur_2", "femur_3")
 _SIZES = (0.95, 0.98, 1.02, 1.05)
@@ -54,15 +55,12 @@ def main() -> int:
 
 def _wrong(own: TriangleMesh, folder: Path) -> Iterator[tuple[str, TriangleMesh]]:
     """Wrong femurs where the right one lies."""
-    centre_mm = own.centroid_mm
     yield "pictures swapped", own
-    mirrored = (own.vertices_mm - centre_mm) * np.array([-1.0, 1.0, 1.0]) + centre_mm
-    yield "other side", TriangleMesh(mirrored, own.faces[:, ::-1])
+    yield "other side", stretch(own, OTHER_SIDE)
     for name in _OTHERS:
         yield f"another person ({name})", _moved_onto(own, read_other(folder, name))
     for size in _SIZES:
-        scaled = centre_mm + size * (own.vertices_mm - centre_mm)
-        yield f"size x {size:g}", TriangleMesh(scaled, own.faces)
+        yield f"size x {size:g}", stretch(own, size)
 
 
 def read_other(folder: Path, name: str) -> TriangleMesh:

@@ -11,20 +11,19 @@ a scanner that is off by so much; the error is their distance from where they ar
 import argparse
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from navapp.control.stages import stage_by_name
 from navapp.evaluation.sequence import KnownSequence
-from navapp.geometry.mesh import TriangleMesh
-from navapp.geometry.transform import FloatArray
 from navapp.registration.verdict import Goal
 from navapp.resection.cut_bone import CutBone
 from navapp.tracking import TrackState
 from navapp.tracking.bimcc_tracker import BimccTracker
 from navapp.values import BoneModel, Status, TrackedFrame
 from tests.bench.bounds import FIRST_SEED, render_knee
+from tests.bench.wrong_bones import stretch_bone, stretch_points
 
 _SIZES = (0.97, 0.98, 0.985, 0.99, 1.0, 1.01, 1.015, 1.02, 1.03)
 
@@ -83,24 +82,12 @@ def find_bone_as_made(sequence: KnownSequence) -> BoneModel:
     return CutBone(sequence.plan.bones[name], made).model
 
 
-def stretch_bone(
-    bone: BoneModel, targets_mm: FloatArray, factors: FloatArray
-) -> tuple[BoneModel, FloatArray]:
-    """A bone and its targets (N, 3), stretched along the axes (3,) about the bone's middle."""
-    mesh, centre_mm = bone.mesh, bone.mesh.centroid_mm
-    vertices_mm, moved_mm = (
-        centre_mm + factors * (one - centre_mm) for one in (mesh.vertices_mm, targets_mm)
-    )
-    # Mirrored triangles are seen from the other side.
-    faces = mesh.faces if np.prod(factors) > 0.0 else mesh.faces[:, ::-1]
-    return replace(bone, mesh=TriangleMesh(vertices_mm, faces)), moved_mm
-
-
 def track_sized(sequence: KnownSequence, size: float) -> Iterator[SizedFrame]:
     """Frames of a sequence, each followed from the true pose with a model of another size."""
     stage = sequence.stage
     targets_mm = sequence.plan.targets_of(stage.targets)
-    bone, sized_mm = stretch_bone(find_bone_as_made(sequence), targets_mm, np.full(3, size))
+    own = find_bone_as_made(sequence)
+    bone, sized_mm = stretch_bone(own, size), stretch_points(targets_mm, own.mesh, size)
     tracker = BimccTracker(sequence.rig, bone)
     goal = Goal(sized_mm, stage.tolerance_mm)
     for frame, true in zip(sequence.frames, sequence.truth, strict=True):
