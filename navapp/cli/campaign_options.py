@@ -28,7 +28,7 @@ class Counts:
 def read_counts(
     options: argparse.Namespace, usual: Counts, quick_frames: int, most_tests: int, what: str
 ) -> Counts:
-    """Of --tests, --frames, --seed and --quick.
+    """Read --tests, --frames, --seed and --quick.
 
     Args:
         options: of the command line.
@@ -62,7 +62,7 @@ def read_counts(
 def choose_cases(
     options: argparse.Namespace, usual_samples: list[str] | None = None
 ) -> "tuple[Case, ...]":
-    """Of --samples, --stages and --situations, in the order of the tables.
+    """Cases that --samples, --stages and --situations choose, in the order of the tables.
 
     Args:
         options: of the command line.
@@ -81,7 +81,7 @@ def choose_cases(
 
 
 def choose_methods(options: argparse.Namespace) -> "tuple[Method, ...]":
-    """Of --methods, in the order of the tables."""
+    """Methods that --methods chooses, in the order of the tables."""
     from navapp.evaluation.methods import METHODS
 
     return tuple(name for name in METHODS if _is_chosen(name, options.methods))

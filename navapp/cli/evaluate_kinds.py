@@ -7,20 +7,14 @@ from navapp.errors import UsageError
 
 Kind = Literal["tables", "stress", "ablation", "recording"]
 _KINDS: Final[tuple[Kind, ...]] = ("recording", "stress", "ablation")
-# Kinds in which each option has a meaning; the others have one in all.
-_OPTIONS: dict[str, frozenset[Kind]] = {
-    **dict.fromkeys(("samples", "stages", "situations"), frozenset[Kind](("tables", "ablation"))),
-    "methods": frozenset(("tables", "recording")),
-    **dict.fromkeys(
-        ("tests", "frames", "seed", "quick", "processes"),
-        frozenset[Kind](("tables", "stress", "ablation")),
-    ),
-    "peers": frozenset(("tables",)),
-    "axes": frozenset(("stress",)),
-    **dict.fromkeys(
-        ("rig", "plan", "truth", "prior", "bone", "fps", "allow_unaccepted"),
-        frozenset[Kind](("recording",)),
-    ),
+_CASES = ("samples", "stages", "situations")
+_COUNTS = ("tests", "frames", "seed", "quick", "processes")
+# Options that have a meaning in each kind; those not named here have one in all.
+_OPTIONS: dict[Kind, tuple[str, ...]] = {
+    "tables": (*_CASES, "methods", *_COUNTS, "peers"),
+    "ablation": (*_CASES, *_COUNTS),
+    "stress": (*_COUNTS, "axes"),
+    "recording": ("methods", "rig", "plan", "truth", "prior", "bone", "fps", "allow_unaccepted"),
 }
 
 
@@ -36,15 +30,15 @@ def find_kind(options: argparse.Namespace) -> Kind:
             f"--{asked[0]} and --{asked[1]} are two evaluations", remedy="run one at a time"
         )
     kind: Kind = asked[0] if asked else "tables"
-    for name, kinds in _OPTIONS.items():
-        if kind in kinds or not _is_given(options, name):
+    for name in dict.fromkeys(name for names in _OPTIONS.values() for name in names):
+        if name in _OPTIONS[kind] or not _is_given(options, name):
             continue
         option = f"--{name.replace('_', '-')}"
         if asked:
             raise UsageError(
                 f"{option} cannot be used with --{kind}", remedy="leave one of them out"
             )
-        (needed,) = kinds
+        needed = next(one for one, names in _OPTIONS.items() if name in names)
         raise UsageError(f"{option} means nothing without --{needed}", remedy=f"add --{needed}")
     return kind
 

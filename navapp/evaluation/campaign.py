@@ -16,7 +16,7 @@ from navapp.errors import InputError, UsageError
 from navapp.evaluation.following import follow
 from navapp.evaluation.methods import OURS, find_method
 from navapp.evaluation.provenance import list_libraries, name_processor
-from navapp.evaluation.scores import Followed
+from navapp.evaluation.scores import SequenceScore
 from navapp.evaluation.scoring import score_answers
 from navapp.evaluation.sequence import KnownSequence
 from navapp.evaluation.workers import run_in_processes
@@ -24,7 +24,7 @@ from navapp.evaluation.worst_frame import draw_worst_frame
 from navapp.geometry.whole_files import write_whole
 
 _SETTINGS, _TESTS, _TIMES, _PICTURES = "settings.json", "tests", "times", "pictures"
-# Settings that tell the code: results of two kinds of code do not belong into one table.
+# Keys that tell which code made the results: results of different code are not mixed.
 _SOURCE = "source"
 _LIBRARIES = "libraries"
 
@@ -82,7 +82,7 @@ class Campaign(Protocol[T]):
         ...
 
     def __hash__(self) -> int:
-        """It does not change."""
+        """Settings are immutable: `_warm_up` is cached by them."""
         ...
 
 
@@ -91,7 +91,7 @@ class Done(Generic[T]):
     """A test with what each method made of it."""
 
     test: T
-    followed: dict[str, Followed]
+    scores: dict[str, SequenceScore]  # by the method's name
     machine: str = ""  # that it was run on
 
 
@@ -102,7 +102,7 @@ class _TestFile:
     test: str
     seed: int
     machine: str
-    methods: dict[str, Followed]
+    methods: dict[str, SequenceScore]
 
 
 _TEST_FILE = TypeAdapter(_TestFile)
@@ -153,7 +153,7 @@ class CampaignFolder(Generic[T]):
             ) from error
 
     def check_code(self) -> None:
-        """Refuse what other code has made than the folder was begun with.
+        """Check that the code is still the one that the folder was opened with.
 
         Raises:
             UsageError: the code of navapp was changed while it ran.
@@ -166,11 +166,11 @@ class CampaignFolder(Generic[T]):
             )
 
     def file_of(self, test: T, *, is_timed: bool) -> Path:
-        """Of a test's results."""
+        """Path of a test's results."""
         return self.path / (_TIMES if is_timed else _TESTS) / f"{test.name}.json"
 
     def picture_of(self, test: T) -> Path:
-        """Of a test's worst frame."""
+        """Path of the picture of a test's worst frame."""
         return self.path / _PICTURES / f"{test.name}.jpg"
 
     def write(self, done: Done[T], *, is_timed: bool, picture: bytes | None = None) -> None:
@@ -182,7 +182,7 @@ class CampaignFolder(Generic[T]):
         """
         self.check_code()
         test = done.test
-        kept = _TestFile(test.name, test.seed, done.machine, done.followed)
+        kept = _TestFile(test.name, test.seed, done.machine, done.scores)
         # A number that is none must not be read as "not known" later: it raises here.
         content = _TEST_FILE.dump_python(kept)
         path = self.file_of(test, is_timed=is_timed)
@@ -218,12 +218,12 @@ class CampaignFolder(Generic[T]):
                 continue
             try:
                 kept = _TEST_FILE.validate_json(path.read_bytes())
-                followed = {method: kept.methods[method] for method in self._settings.methods}
+                scores = {method: kept.methods[method] for method in self._settings.methods}
             except (ValueError, KeyError) as error:
                 raise InputError(
                     f"{path} is damaged", subject=str(path), remedy="delete it, and run again"
                 ) from error
-            yield Done(test, followed, kept.machine)
+            yield Done(test, scores, kept.machine)
 
 
 def run_campaign(

@@ -23,10 +23,10 @@ from navapp.tracking import Method, Part
 from navapp.values import PoseEstimate, Status, Verdict
 
 # A bone that so many searches have not found is not searched for any more.
-_MOST_REGISTRATIONS = 5
+MOST_REGISTRATIONS = 5
 
 
-class Follower:
+class Operator:
     """The operator of a test: registers, accepts what is OK, and does nothing more.
 
     What is not OK is rejected and searched for again in the next frame; the last search is accepted
@@ -42,7 +42,7 @@ class Follower:
     def commands(self, snapshot: Snapshot) -> list[Command]:
         """What to do now."""
         if snapshot.state in (SessionState.STARTING, SessionState.READY):
-            if self.n_registrations == _MOST_REGISTRATIONS:
+            if self.n_registrations == MOST_REGISTRATIONS:
                 return []
             self.n_registrations += 1
             return [Register()]
@@ -51,10 +51,15 @@ class Follower:
         status = Status.LOST if snapshot.verdict is None else snapshot.verdict.status
         if status is Status.LOST and self.follows_refused:
             return []
-        is_last = self.follows_refused or self.n_registrations == _MOST_REGISTRATIONS
-        is_enough = status is Status.OK or (is_last and status is not Status.LOST)
+        is_last = self.follows_refused or self.n_registrations == MOST_REGISTRATIONS
+        is_enough = is_accepted(status, is_last=is_last)
         self.has_accepted |= is_enough
         return [(Accept if is_enough else Reject)(snapshot.candidate_id)]
+
+
+def is_accepted(status: Status, *, is_last: bool) -> bool:
+    """Whether a pose is accepted: an OK one; after the last search any that is not LOST."""
+    return status is Status.OK or (is_last and status is not Status.LOST)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,9 +73,14 @@ class FrameAnswer:
     is_search: bool  # a registration was made in it
 
     @property
+    def status(self) -> Status:
+        """The judge's word; LOST where the bone was not looked for."""
+        return Status.LOST if self.verdict is None else self.verdict.status
+
+    @property
     def is_ok(self) -> bool:
         """The judge believes the pose."""
-        return self.verdict is not None and self.verdict.status is Status.OK
+        return self.status is Status.OK
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,7 +112,8 @@ def follow(
         NavappError: the session ended in a fault: a picture that cannot be read.
     """
     follows_refused = method != OURS
-    operator, recorder = Follower(follows_refused=follows_refused), _Recorder()
+    operator = Operator(follows_refused=follows_refused)
+    recorder = _Recorder(operator)
     clock = ManualClock()
     specification = specify_session(
         sequence.configuration,
@@ -123,7 +134,7 @@ def follow(
             devices,
             specification,
             executor=InlineExecutor(),
-            hooks=SessionHooks(on_frame=(lambda result: recorder.take(result, operator),)),
+            hooks=SessionHooks(on_frame=(recorder.take,)),
         )
         undo.callback(controller.close)
         surface = controller.snapshot.bone_surface or sequence.plan.bones[sequence.stage.bone].mesh
@@ -131,13 +142,14 @@ def follow(
         run_headless(controller, operator)
         if controller.failure is not None:
             raise controller.failure
-    return recorder.answer(operator, surface)
+    return recorder.answer(surface)
 
 
 class _Recorder:
     """Notes what is said of frames as they come, and when."""
 
-    def __init__(self) -> None:
+    def __init__(self, operator: Operator) -> None:
+        self._operator = operator
         self._frames: list[FrameAnswer] = []
         self._n_searches = 0  # that were made before the newest frame
         self._taken_s: list[float] = []  # when each frame was done
@@ -147,11 +159,11 @@ class _Recorder:
         """Times count from now."""
         self._began_s = time.perf_counter()
 
-    def take(self, result: FrameResult, operator: Follower) -> None:
-        """A frame was handled."""
+    def take(self, result: FrameResult) -> None:
+        """Note the answer to a frame."""
         tracked = result.tracked
-        is_search = operator.n_registrations > self._n_searches
-        self._n_searches = operator.n_registrations
+        is_search = self._operator.n_registrations > self._n_searches
+        self._n_searches = self._operator.n_registrations
         self._taken_s.append(time.perf_counter() - self._began_s)
         self._frames.append(
             FrameAnswer(
@@ -163,18 +175,17 @@ class _Recorder:
             )
         )
 
-    def answer(self, operator: Follower, surface: TriangleMesh) -> Answers:
-        """All of it."""
-        return Answers(
-            tuple(self._frames), self._find_start_s(operator), operator.n_registrations, surface
-        )
+    def answer(self, surface: TriangleMesh) -> Answers:
+        """All answers that were noted."""
+        n_registrations = self._operator.n_registrations
+        return Answers(tuple(self._frames), self._find_start_s(), n_registrations, surface)
 
-    def _find_start_s(self, operator: Follower) -> float | None:
+    def _find_start_s(self) -> float | None:
         """When the search was done whose pose was followed."""
-        if operator.follows_refused:
+        if self._operator.follows_refused:
             started = [place for place, one in enumerate(self._frames) if one.pose is not None][:1]
         else:
             # What was accepted is the last search; those before it were rejected.
             searches = [place for place, one in enumerate(self._frames) if one.is_search]
-            started = searches[-1:] if operator.has_accepted else []
+            started = searches[-1:] if self._operator.has_accepted else []
         return self._taken_s[started[0]] if started else None

@@ -1,10 +1,11 @@
-"""What frames have in common: how many are OK, how far off they are, how often bounds hold."""
+"""Figures of a set of frames: how many are OK, how far off they are, how often bounds hold."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from navapp.evaluation.methods import OURS
 from navapp.evaluation.scores import FrameScore
 
 
@@ -66,8 +67,14 @@ class FrameFigures:
 
     def percentile_mm(self, percent: float) -> float | None:
         """TRE that so many of 100 frames stay below."""
-        errors_mm = self.errors_mm
-        return float(np.percentile(errors_mm, percent)) if errors_mm else None
+        return find_percentile(self.errors_mm, percent)
+
+    def select_counted(self, method: str) -> "FrameFigures":
+        """Frames whose errors count: OK ones for ours, all with an error for the paper's methods.
+
+        Our judge is not made for the paper's methods.
+        """
+        return self.ok if method == OURS else self.with_error
 
     @property
     def mean_displacement_mm(self) -> float | None:
@@ -91,6 +98,17 @@ def pool_frames(parts: Iterable[Sequence[FrameScore]]) -> FrameFigures:
 
 
 def find_mean(values: Iterable[float | None]) -> float | None:
-    """Of the known ones; None without any."""
+    """Mean of the known values; None without any."""
     known = [value for value in values if value is not None]
     return float(np.mean(known)) if known else None
+
+
+def find_percentile(values: Sequence[float], percent: float) -> float | None:
+    """The value that so many of 100 stay below; None without any."""
+    return float(np.percentile(values, percent)) if values else None
+
+
+def find_rate_hz(times_ms: Sequence[float]) -> float | None:
+    """One over the mean time of a frame; None without any."""
+    mean_ms = find_mean(times_ms)
+    return None if mean_ms is None else 1e3 / mean_ms

@@ -12,7 +12,7 @@ from navapp.values import BoneModel
 
 @dataclass(frozen=True, slots=True)
 class PoseErrors:
-    """In mm; None is not known."""
+    """Errors of one pose, mm; None where unknown."""
 
     tre_mm: float | None = None  # mean over the stage's targets (`compute_mean_tre_mm`)
     # Of the drawn bone (`OverlayError`).

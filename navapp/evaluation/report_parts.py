@@ -16,6 +16,10 @@ _CLAIMED_COLUMNS = tuple(f"claimed_{100.0 * level:.0f}_mm" for level in LEVELS)
 _BUDGET_COLUMNS = ("limit_mm", "ideal_mm", "matched_mm", "reached_mm")
 
 
+# The last line of what is told of a run.
+SIMULATED_NOTE = "simulated devices; research software, not for clinical use"
+
+
 def format_mm(value: float | None) -> str:
     """A length for a table; a dash where there is none."""
     if value is None:
@@ -56,7 +60,7 @@ def render_markdown(text: str) -> str:
     return rendered
 
 
-def make_figure(jpeg: bytes, caption: str) -> str:
+def make_picture(jpeg: bytes, caption: str) -> str:
     """A picture with its caption as HTML."""
     data, told = base64.b64encode(jpeg).decode("ascii"), escape(caption)
     return (

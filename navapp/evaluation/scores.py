@@ -54,8 +54,9 @@ class FrameScore:
     @property
     def is_within_bound(self) -> bool:
         """Error and predicted bound are known, and the error is below the bound."""
-        known = self.tre_mm is not None and self.bound_mm is not None
-        return known and (self.tre_mm or 0.0) <= (self.bound_mm or 0.0)
+        if self.tre_mm is None or self.bound_mm is None:
+            return False
+        return self.tre_mm <= self.bound_mm
 
     @property
     def is_wrong(self) -> bool:
@@ -72,8 +73,8 @@ class FrameScore:
 
 
 @dataclass(frozen=True, slots=True)
-class Followed:
-    """What a method made of a sequence."""
+class SequenceScore:
+    """The scores of one method on one sequence."""
 
     # until the first registration whose pose was followed, with those that failed before; None:
     # none was.

@@ -7,17 +7,17 @@ from navapp.evaluation.following import Answers, FrameAnswer
 from navapp.evaluation.noise_limit.frame import measure_budget
 from navapp.evaluation.pose_errors import PoseErrors, measure_pose
 from navapp.evaluation.predicted_errors import predict_errors_mm
-from navapp.evaluation.scores import ErrorBudget, Followed, FrameScore
+from navapp.evaluation.scores import ErrorBudget, FrameScore, SequenceScore
 from navapp.evaluation.sequence import KnownSequence
 from navapp.geometry.rectification import rectifier_of
 from navapp.geometry.transform import RigidTransform
-from navapp.values import Status, Verdict
+from navapp.values import Verdict
 
-# One frame of so many has its error budget measured, for time alone.
+# The error budget is measured in every fifth frame only, to save time.
 _BUDGET_EVERY = 5
 
 
-def score_answers(sequence: KnownSequence, answers: Answers, *, has_budget: bool) -> Followed:
+def score_answers(sequence: KnownSequence, answers: Answers, *, has_budget: bool) -> SequenceScore:
     """The scores of all frames but the first one, in which the bone is searched.
 
     Args:
@@ -27,7 +27,7 @@ def score_answers(sequence: KnownSequence, answers: Answers, *, has_budget: bool
     """
     scorer = _Scorer(sequence, answers, has_budget=has_budget)
     frames = tuple(scorer.score(place) for place in range(1, len(answers.frames)))
-    return Followed(answers.registration_s, answers.n_registrations, frames)
+    return SequenceScore(answers.registration_s, answers.n_registrations, frames)
 
 
 class _Scorer:
@@ -48,7 +48,7 @@ class _Scorer:
         verdict, errors = answer.verdict, self._measure(answer, true)
         return FrameScore(
             index=place,
-            status=Status.LOST.value if verdict is None else verdict.status.value,
+            status=answer.status.value,
             reasons=() if verdict is None else tuple(one.value for one in verdict.reasons),
             tre_mm=errors.tre_mm,
             displacement_mm=errors.displacement_mm,
@@ -84,7 +84,7 @@ class _Scorer:
     def _measure_budget(
         self, place: int, answer: FrameAnswer, true: RigidTransform | None
     ) -> ErrorBudget | None:
-        """Of one OK frame of some."""
+        """The error budget of every fifth frame that is OK; None for others."""
         is_asked = self._has_budget and place % _BUDGET_EVERY == 1
         if not (is_asked and answer.is_ok) or answer.pose is None or true is None:
             return None
@@ -103,7 +103,7 @@ class _Scorer:
 
 
 def _finite(bound_mm: float | None) -> float | None:
-    """None of a bound without end: nothing bounds that error."""
+    """None for an infinite bound."""
     return None if bound_mm is None or math.isinf(bound_mm) else bound_mm
 
 

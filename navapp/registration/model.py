@@ -24,8 +24,8 @@ _MOST_VOXELS = 400_000
 _GRID_MARGIN_MM = 14.0
 _SMOOTHING_ROUNDS = 2
 _LEAST_SIGMA_MM = 1e-3
-# Widest kernel over the model's radius: 6 mm of a patella; from 36 mm on as wide as any is. Chosen;
-# compared in tests.bench.small_bones.
+# Widest kernel as a share of the model's radius: 6 mm for a patella; from a radius of 36 mm on the
+# usual 12 mm is the limit. Chosen; compared in tests.bench.small_bones.
 _KERNEL_PER_RADIUS = 1.0 / 3.0
 
 

@@ -174,7 +174,7 @@ RULES = (
          lambda e: e.saturated_fraction, UNUSABLE_FRACTION, None, CHOSEN),
     Rule(Reason.PICTURES_UNLIKE, "detail of one picture over the other's",
          lambda e: e.detail_ratio, 2.0, None, CHOSEN),
-    Rule(Reason.PICTURES_BLURRED, "growth of differences from 4 to 8 rows over that from 2 to 4",
+    Rule(Reason.PICTURES_DEFOCUSED, "smoothness of the less sharp picture",
          lambda e: e.smoothness, 2.9, None, "chosen; compared in tests.bench.defocus"),
     Rule(Reason.ROWS_DISAGREE, "rows too far apart to be compared (yes 1)",
          lambda e: e.has_lost_rows, 0, None, _HEALTH),

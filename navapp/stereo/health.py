@@ -159,15 +159,15 @@ def _picture_health(picture: Image, box: Box) -> PictureHealth:
 
 
 def _measure_smoothness(part: NDArray[np.float32]) -> float:
-    """As of `PictureHealth`; `part` has every second row."""
+    """`PictureHealth.smoothness` of a picture (H, W) that holds every second row."""
     if part.shape[0] <= 4:
         return math.nan
-    near, middle, far = (_mean_square_step(part, n_rows) for n_rows in (1, 2, 4))
-    # Of noise alone the mean square of n differences has this standard error, nearly.
+    near, middle, far = (_mean_square_step(part, n) for n in (1, 2, 4))
+    # Approximate standard error of a mean square, if the differences are noise alone.
     error = near * math.sqrt(2.0 / part.size)
     return (far - middle) / (middle - near) if middle - near > _SURE_ERRORS * error else math.nan
 
 
-def _mean_square_step(part: NDArray[np.float32], n_rows: int) -> float:
-    step = (part[n_rows:] - part[:-n_rows]).ravel()
+def _mean_square_step(part: NDArray[np.float32], n_steps: int) -> float:
+    step = (part[n_steps:] - part[:-n_steps]).ravel()
     return float(step @ step) / len(step)

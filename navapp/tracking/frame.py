@@ -28,7 +28,7 @@ TOLERATED_VARIANCE_RATIO = 0.65**2
 
 
 def limit_kernel(settings: BimccSettings, model: RegistrationModel) -> BimccSettings:
-    """Settings for a model that may be small: no kernel wider than finds it in tissue."""
+    """The settings, with no kernel wider than `model.widest_kernel_mm`."""
     return settings._replace(widest_mm=min(settings.widest_mm, model.widest_kernel_mm))
 
 

@@ -41,13 +41,13 @@ from navapp.values import (
 # their standard deviations.
 _COMMON_ERROR_SIGMAS = 2.0
 _SURE_SIGMAS = 3.0
-# Pictures that say nothing of the rig.
-_UNUSABLE = frozenset(
+# Reasons that leave the rows of a pair without word on the rig.
+UNUSABLE_PICTURES = frozenset(
     {
         Reason.PICTURE_DARK,
         Reason.PICTURE_OVEREXPOSED,
         Reason.PICTURES_UNLIKE,
-        Reason.PICTURES_BLURRED,
+        Reason.PICTURES_DEFOCUSED,
     }
 )
 # A model that the outline moved by no more looks as it was matched; a follower allows as much.
@@ -293,7 +293,7 @@ def _sure(value: float, sigma: float) -> float:
 
 def _check_rows(health: StereoHealth, evidence: Evidence, verdict: Verdict) -> RowCheck | None:
     """What a pair says of its rig; None when its pictures or its points are too poor to tell."""
-    is_poor = math.isnan(health.row_offset_px) or not _UNUSABLE.isdisjoint(verdict.reasons)
+    is_poor = math.isnan(health.row_offset_px) or not UNUSABLE_PICTURES.isdisjoint(verdict.reasons)
     return None if is_poor else RowCheck(health.row_offset_px, evidence.row_error_mm > OK_ERROR_MM)
 
 

@@ -30,8 +30,8 @@ class TrackState:
     velocity: FloatArray | None
     n_lost: int = 0  # frames lost since then
     n_searches: int = 0  # searches made in these frames
-    # consecutive frames in doubt; a lost frame leaves the count alone, a frame in which a search
-    # could gain nothing sets it to 0, and a glance that doubts to 1
+    # consecutive frames in doubt; a lost frame leaves it, a frame in which a search could gain
+    # nothing sets it to 0, a doubtful glance to 1
     n_doubted: int = 0
     # of the bone in the newest picture, and what it looks like; None before the first.
     box: BoxState | None = None
@@ -53,7 +53,7 @@ class TrackState:
     def is_search_due(self) -> bool:
         """Whether the next frame, if in doubt too, is searched elsewhere: ever more rarely.
 
-        Not the first: most single frames in doubt are over with the next.
+        The first doubtful frame begins no search: usually the next one is sure again.
         """
         return self.n_doubted > 0 and _is_due(self.n_doubted, _MOST_BETWEEN_SEARCHES)
 

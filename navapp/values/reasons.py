@@ -27,7 +27,7 @@ class Reason(Enum):
     PICTURE_DARK = "one picture is dark or blocked"
     PICTURE_OVEREXPOSED = "one picture is overexposed"
     PICTURES_UNLIKE = "one picture is blurred or covered"
-    PICTURES_BLURRED = "the pictures are out of focus"
+    PICTURES_DEFOCUSED = "the pictures are out of focus"
     PICTURES_SWAPPED = "left and right pictures are swapped"
     OTHER_SIDE = "the other side's bone fits better: is it the other knee's plan?"
     RIG_NOT_ACCEPTED = "the rig's calibration was not accepted"
@@ -84,7 +84,7 @@ _REMEDIES = {
     Reason.PICTURE_DARK: "uncover both cameras, or check the light",
     Reason.PICTURE_OVEREXPOSED: "turn the light or the exposure down",
     Reason.PICTURES_UNLIKE: "clean and uncover both cameras",
-    Reason.PICTURES_BLURRED: "focus both cameras, and clean their lenses",
+    Reason.PICTURES_DEFOCUSED: "focus both cameras, and clean their lenses",
     Reason.PICTURES_SWAPPED: "swap the cameras' cables, or their names in the settings",
     Reason.OTHER_SIDE: "check the patient, the side and the plan; load the right one",
     Reason.RIG_NOT_ACCEPTED: "calibrate the rig again",

@@ -4,7 +4,7 @@ usage: .venv-peers/bin/python -m tests.bench.peer_frames FOLDER
        .venv-peers/bin/python -m tests.bench.peer_frames --check
 
 FOLDER is one of `navapp evaluate`. Its tests are rendered again from their seeds, and followed by
-every peer from the pose that our registration finds in the first frame. As soon as a test is done,
+every peer from our first accepted pose. As soon as a test is done,
 its file is written into `peers/`, and its name is printed. Started again, it follows only the tests
 that lack a file or a peer in it, or were followed by other code of the peers. One test is run at a
 time, so that the times are those of one tracker. `--check` only loads what the peers need.
@@ -19,18 +19,14 @@ from importlib.metadata import distributions
 from pathlib import Path
 
 from navapp.environment import source_hash
-from navapp.evaluation.following import follow
+from navapp.evaluation.following import MOST_REGISTRATIONS, follow, is_accepted
 from navapp.evaluation.paper.settings import TableSettings
 from navapp.evaluation.peers.scores import PeerFrame, PeerTest, read_peers, write_peers
 from navapp.evaluation.sequence import KnownSequence
 from navapp.evaluation.truth import compute_mean_tre_mm
 from navapp.geometry.mesh import TriangleMesh
 from navapp.geometry.transform import RigidTransform
-from navapp.values import Status
 from tests.bench.peer_trackers import Peer, make_peers
-
-# In so many frames the bone is searched for, as in the tests of our own methods.
-_MOST_REGISTRATIONS = 5
 
 
 def main(argument: str) -> None:
@@ -87,14 +83,13 @@ def find_start(sequence: KnownSequence) -> Start | None:
 
     As for our own method a pose must be OK; only the last search is taken if it is not lost.
     """
-    n_searches = min(_MOST_REGISTRATIONS, len(sequence.frames))
+    n_searches = min(MOST_REGISTRATIONS, len(sequence.frames))
     for place in range(n_searches):
         part = slice(place, place + 1)
         here = replace(sequence, frames=sequence.frames[part], truth=sequence.truth[part])
         answers = follow(here, "bimcc")
         (found,) = answers.frames
-        is_lost = found.verdict is None or found.verdict.status is Status.LOST
-        is_enough = found.is_ok or (place == n_searches - 1 and not is_lost)
+        is_enough = is_accepted(found.status, is_last=place == n_searches - 1)
         if is_enough and found.pose is not None:
             return Start(place, found.pose, answers.surface)
     return None

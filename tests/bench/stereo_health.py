@@ -24,6 +24,7 @@ from navapp.geometry.rig_files import read_rig
 from navapp.geometry.transform import RigidTransform, rotation_from_vector
 from navapp.stereo import measure_health
 from navapp.tracking import TrackState
+from navapp.tracking.judging import UNUSABLE_PICTURES
 from navapp.tracking.surface_meter import WIDE_VIEW
 from navapp.values import BoneModel, Reason, Status
 from tests.bench.tracker_parts import GOAL, TrackerParts
@@ -31,11 +32,6 @@ from tests.pictures import Pictures
 from tests.recorded import read_frames
 
 OFFSETS_PX = (0.0, 0.15, 0.3, 0.5, -0.5, 1.0)
-# Of a pair's pictures, beside its rows.
-OF_LIGHT = {
-    Reason.PICTURE_DARK, Reason.PICTURE_OVEREXPOSED, Reason.PICTURES_UNLIKE,
-    Reason.PICTURES_BLURRED,
-}  # fmt: skip
 _NO_TARGETS = np.empty((0, 3))
 
 
@@ -101,7 +97,7 @@ def _follow_points(rig: StereoRig, bone: BoneModel, sequence: Path) -> Iterator[
             health.row_offset_px,
             health.row_offset_sigma_px,
             Reason.ROWS_DISAGREE in reasons,
-            len(OF_LIGHT.intersection(reasons)),
+            len(UNUSABLE_PICTURES.intersection(reasons)),
             tracked.verdict.status is Status.OK,
             np.nan if found is None else compute_mean_tre_mm(found, truth, bone, _NO_TARGETS),
             cost_ms,

@@ -6,7 +6,7 @@ from typing import Any
 from navapp.evaluation.campaign import Done
 from navapp.evaluation.methods import METHODS
 from navapp.evaluation.paper.cases import ALL_CASES, Case, list_tests
-from navapp.evaluation.scores import Followed, FrameScore
+from navapp.evaluation.scores import FrameScore, SequenceScore
 from navapp.tracking import Method
 
 
@@ -21,12 +21,12 @@ def score(tre_mm: float | None, status: str = "OK", **changes: Any) -> FrameScor
     return FrameScore(**{**values, **changes})
 
 
-def followed(*frames: FrameScore, registration_s: float | None = 1.0) -> Followed:
-    return Followed(registration_s, 1, frames)
+def followed(*frames: FrameScore, registration_s: float | None = 1.0) -> SequenceScore:
+    return SequenceScore(registration_s, 1, frames)
 
 
 def done(
-    *tests: Followed, case: Case = ALL_CASES[0], methods: Sequence[Method] = METHODS
+    *tests: SequenceScore, case: Case = ALL_CASES[0], methods: Sequence[Method] = METHODS
 ) -> list[Done]:
     """These tests of a case, the same for every method."""
     numbered = list_tests([case], len(tests), 1)

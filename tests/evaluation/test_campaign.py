@@ -135,7 +135,7 @@ def test_every_test_has_a_file_and_the_first_of_each_case_its_times(line, tmp_pa
     )
     assert [news[:2] for news in told] == [(n, 6) for n in range(7)]
     assert [one.test.name for one in folder.read(is_timed=False)] == NAMES
-    assert list(next(folder.read(is_timed=True)).followed) == ["paper", "bimcc"]
+    assert list(next(folder.read(is_timed=True)).scores) == ["paper", "bimcc"]
 
 
 def test_times_are_taken_when_everything_is_loaded(line, tmp_path) -> None:

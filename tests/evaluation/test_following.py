@@ -13,7 +13,7 @@ from navapp.control.controller import SessionController
 from navapp.control.stages import STAGES
 from navapp.control.states import SessionState
 from navapp.evaluation import following
-from navapp.evaluation.following import Follower, follow
+from navapp.evaluation.following import Operator, follow
 from navapp.evaluation.paper.cases import Case, CaseTest
 from navapp.evaluation.scoring import score_answers
 from navapp.evaluation.sequence import KnownSequence
@@ -51,14 +51,14 @@ def script(monkeypatch) -> Script:
 def given(monkeypatch) -> list[type]:
     """The commands that operators give, by their kind."""
     kinds: list[type] = []
-    whole = Follower.commands
+    whole = Operator.commands
 
     def note(self, snapshot):
         commands = whole(self, snapshot)
         kinds.extend(type(one) for one in commands)
         return commands
 
-    monkeypatch.setattr(Follower, "commands", note)
+    monkeypatch.setattr(Operator, "commands", note)
     return kinds
 
 
@@ -146,12 +146,12 @@ def test_a_later_search_counts_with_those_before(script, monkeypatch, first) -> 
 )
 def test_what_is_lost_is_never_accepted(verdict, follows_refused, expected) -> None:
     snapshot = replace(Bench().snapshot, state=SessionState.REVIEW, verdict=verdict, candidate_id=3)
-    assert Follower(follows_refused=follows_refused).commands(snapshot) == expected
+    assert Operator(follows_refused=follows_refused).commands(snapshot) == expected
 
 
 def test_nothing_is_done_while_it_navigates() -> None:
     snapshot = replace(Bench().snapshot, state=SessionState.NAVIGATING, verdict=LOST.verdict)
-    assert Follower(follows_refused=False).commands(snapshot) == []
+    assert Operator(follows_refused=False).commands(snapshot) == []
 
 
 def test_ours_accepts_what_is_doubted_when_it_has_searched_often(script, given) -> None:

@@ -9,8 +9,8 @@ from navapp.evaluation.report_parts import (
     format_number,
     format_share,
     format_table,
-    make_figure,
     make_frames_csv,
+    make_picture,
     render_markdown,
 )
 from tests.evaluation.scored import score
@@ -44,7 +44,7 @@ def test_a_table_is_markdown() -> None:
 
 
 def test_a_picture_stands_in_the_page_with_its_caption() -> None:
-    page = make_figure(b"jpeg", "worse & worst")
+    page = make_picture(b"jpeg", "worse & worst")
     assert "data:image/jpeg;base64,anBlZw==" in page
     assert page.count("worse &amp; worst") == 2
 

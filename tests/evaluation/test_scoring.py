@@ -6,7 +6,7 @@ import pytest
 from navapp.config import Configuration
 from navapp.control.stages import STAGES
 from navapp.evaluation.following import Answers, FrameAnswer
-from navapp.evaluation.scores import Followed
+from navapp.evaluation.scores import SequenceScore
 from navapp.evaluation.scoring import score_answers
 from navapp.evaluation.sequence import KnownSequence
 from navapp.geometry.transform import RigidTransform
@@ -16,7 +16,7 @@ from tests.control.fakes import PERIOD_NS, a_frame, a_plan, a_pose, a_rig, answe
 N = 9
 
 
-def scored(truth, pose: RigidTransform) -> Followed:
+def scored(truth, pose: RigidTransform) -> SequenceScore:
     """The scores of a method that says the same pose in every frame."""
     frames = [a_frame(10**9 + number * PERIOD_NS, number) for number in range(N)]
     plan = a_plan()

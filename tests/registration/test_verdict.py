@@ -86,7 +86,7 @@ ROWS = (
     Row(Reason.PICTURE_DARK, lambda x: known(dark_fraction=x), 0.7, None),
     Row(Reason.PICTURE_OVEREXPOSED, lambda x: known(saturated_fraction=x), 0.7, None),
     Row(Reason.PICTURES_UNLIKE, lambda x: known(detail_ratio=x), 2.0, None),
-    Row(Reason.PICTURES_BLURRED, lambda x: known(smoothness=x), 2.9, None),
+    Row(Reason.PICTURES_DEFOCUSED, lambda x: known(smoothness=x), 2.9, None),
     Row(Reason.ROWS_DISAGREE, lambda x: known(has_lost_rows=x > 0), 0, None, 1),
     Row(Reason.ROWS_DISAGREE, lambda x: known(row_error_mm=x), 0.5, None),
     Row(Reason.BONE_LOST, missing(Reason.BONE_LOST), None, 0, 1),

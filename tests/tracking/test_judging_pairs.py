@@ -65,7 +65,7 @@ def test_rows_are_doubted_only_beyond_their_own_noise() -> None:
         (PictureHealth(0.8, 0.0, 0.2), Reason.PICTURE_DARK),
         (PictureHealth(0.0, 0.8, 0.01), Reason.PICTURE_OVEREXPOSED),
         (PictureHealth(0.0, 0.0, 0.07), Reason.PICTURES_UNLIKE),
-        (PictureHealth(0.0, 0.0, 0.15, 3.0), Reason.PICTURES_BLURRED),
+        (PictureHealth(0.0, 0.0, 0.15, 3.0), Reason.PICTURES_DEFOCUSED),
         (PictureHealth(0.6, 0.3, 0.14), None),
         (PictureHealth(0.0, 0.0, 0.15, 2.8), None),
     ],

@@ -63,7 +63,7 @@ def test_what_is_out_of_focus_is_never_shown(defocus_px: float) -> None:
     state = TrackState.at_rest(sequence.truth[0], sequence.frames[0].captured_ns)
     goal = Goal(sequence.plan.targets_of(sequence.stage.targets), sequence.stage.tolerance_mm)
     found, _ = tracker.track(sequence.frames[0], state, goal)
-    assert Reason.PICTURES_BLURRED in found.verdict.reasons
+    assert Reason.PICTURES_DEFOCUSED in found.verdict.reasons
 
 
 @pytest.mark.slow

@@ -12,7 +12,7 @@ from navapp.evaluation.paper.cases import SWEEP_FRAMES, CaseTest
 from navapp.evaluation.paper.results import make_case_csv
 from navapp.evaluation.paper.settings import TableSettings
 from navapp.evaluation.provenance import describe_origin
-from navapp.evaluation.report_parts import render_markdown
+from navapp.evaluation.report_parts import SIMULATED_NOTE, render_markdown
 from navapp.geometry.whole_files import write_whole
 
 
@@ -21,7 +21,7 @@ def write_ablation(folder: CampaignFolder[CaseTest], settings: TableSettings) ->
     done = list(folder.read(is_timed=False))
     is_quick = settings.is_quick
     rows = make_variant_rows(done, done if is_quick else list(folder.read(is_timed=True)))
-    tables = make_ablation_tables(rows, _about(settings, done), is_quick=is_quick)
+    tables = make_ablation_tables(rows, _describe_run(settings, done), is_quick=is_quick)
     write_whole(folder.path / "ablation.md", tables.encode())
     of_all = [row for row in rows if row.stage == ALL]
     charts = ["<h2>All stages and situations</h2>", draw_variants(of_all)] if of_all else []
@@ -40,12 +40,12 @@ def write_ablation(folder: CampaignFolder[CaseTest], settings: TableSettings) ->
     }
 
 
-def _about(settings: TableSettings, done: Sequence[Done[CaseTest]]) -> list[str]:
+def _describe_run(settings: TableSettings, done: Sequence[Done[CaseTest]]) -> list[str]:
     samples = ", ".join(dict.fromkeys(case.sample for case in settings.cases))
     return [
         describe_origin(),
         f"{len(done)} of {len(settings.tests)} tests, each another knee, of sample {samples}; "
         f"{settings.n_frames} frames each after the registration (with an instrument at least "
         f"{SWEEP_FRAMES}, but in a quick look); first seed {settings.first_seed}",
-        "simulated devices; research software, not for clinical use",
+        SIMULATED_NOTE,
     ]

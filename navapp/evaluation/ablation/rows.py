@@ -6,10 +6,8 @@ from itertools import product
 from operator import attrgetter
 from typing import Any, Final, Literal
 
-import numpy as np
-
 from navapp.evaluation.campaign import Done
-from navapp.evaluation.frame_figures import FrameFigures, find_mean, pool_frames
+from navapp.evaluation.frame_figures import FrameFigures, find_mean, find_percentile, pool_frames
 from navapp.evaluation.methods import OURS, VARIANTS
 from navapp.evaluation.paper.cases import SITUATIONS, STAGE_NAMES, CaseTest, SituationName
 from navapp.evaluation.scores import FrameScore
@@ -22,7 +20,7 @@ ALIKE_MM = 0.001
 
 @dataclass(frozen=True, slots=True, eq=False)
 class VariantRow:
-    """Of one variant."""
+    """The results of one variant in one stage and situation, or in all."""
 
     stage: str  # or `ALL`, then with the situation `ALL`
     situation: SituationOrAll
@@ -74,16 +72,13 @@ def make_variant_rows(
     """
     rows = [_make_row(ALL, ALL, name, done, timed) for name in VARIANTS if done]
     for stage, situation in product(STAGE_NAMES, SITUATIONS):
-        some, some_timed = (_select(tests, stage, situation) for tests in (done, timed))
+        some, some_timed = (
+            [one for one in tests if one.test.case.place == (stage, situation)]
+            for tests in (done, timed)
+        )
         if some:
             rows += [_make_row(stage, situation, name, some, some_timed) for name in VARIANTS]
     return rows
-
-
-def _select(done: Sequence[Done[CaseTest]], stage: str, situation: str) -> list[Done[CaseTest]]:
-    return [
-        one for one in done if (one.test.case.stage, one.test.case.situation) == (stage, situation)
-    ]
 
 
 def _make_row(
@@ -94,10 +89,10 @@ def _make_row(
     timed: Sequence[Done[CaseTest]],
 ) -> VariantRow:
     figures, whole = (
-        pool_frames(one.followed[name].frames for one in done) for name in (variant, OURS)
+        pool_frames(one.scores[name].frames for one in done) for name in (variant, OURS)
     )
     pairs = list(zip(figures.frames, whole.frames, strict=True))
-    times_ms = [ms for one in timed for ms in one.followed[variant].times_ms]
+    times_ms = [ms for one in timed for ms in one.scores[variant].times_ms]
     return VariantRow(
         stage=stage,
         situation=situation,
@@ -106,9 +101,9 @@ def _make_row(
         figures=figures,
         n_same=sum(_is_same(*both) for both in pairs),
         n_alike=sum(_is_alike(*both) for both in pairs),
-        median_ms=float(np.median(times_ms)) if times_ms else None,
+        median_ms=find_percentile(times_ms, 50.0),
         mean_ms=find_mean(times_ms),
-        registration_s=find_mean(one.followed[variant].registration_s for one in timed),
+        registration_s=find_mean(one.scores[variant].registration_s for one in timed),
     )
 
 

@@ -10,15 +10,14 @@ from navapp.evaluation.scores import FrameScore
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JudgeFigures:
-    """Over all frames of all knees."""
+    """How often the judge called wrong poses of one method OK, over all knees."""
 
     method: str
     figures: FrameFigures
     n_knees: int  # with an OK frame
     n_wrong_knees: int  # with a wrong one that is OK
 
-    @property
-    def wrong_at_most(self) -> tuple[float, float]:
+    def find_upper_limits(self) -> tuple[float, float]:
         """Upper 95 % limits of the share of wrong ones: of OK frames, and of knees.
 
         Frames of one knee are much alike: the limit by knees is the one to be believed.
@@ -30,7 +29,7 @@ class JudgeFigures:
 
     def to_json(self) -> dict[str, Any]:
         """Named values."""
-        by_frames, by_knees = self.wrong_at_most
+        by_frames, by_knees = self.find_upper_limits()
         return {
             "frames": self.figures.n_frames,
             "ok": self.figures.n_ok,

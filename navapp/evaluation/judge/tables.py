@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from navapp.evaluation.judge.rejector import SHARES, TOLD_SHARES, Rejector
 from navapp.evaluation.judge.reliability import BoundQuality, Reliability
 from navapp.evaluation.noise_limit.summary import LEAST_EFFICIENCY, STEPS, Efficiency
+from navapp.evaluation.report_parts import format_number, format_table
 from navapp.evaluation.scores import WRONG_MM
 
 _REJECTED_BY = {
@@ -46,7 +47,19 @@ def make_rejector_tables(
 
 def _format_rejector(rejector: Rejector) -> list[str]:
     places = [int(abs(SHARES - share).argmin()) for share in TOLD_SHARES]
-    heads = [f"{100.0 * share:.0f} % rejected" for share in TOLD_SHARES]
+    head = (
+        "rejected by", *(f"{100.0 * share:.0f} % rejected" for share in TOLD_SHARES), "area mm",
+        "AUC",
+    )  # fmt: skip
+    cells = (
+        (
+            _REJECTED_BY[name],
+            *(f"{one.mean_mm[place]:.3f} ({one.p95_mm[place]:.3f})" for place in places),
+            f"{one.area_mm:.3f}",
+            format_number(one.auc, 3),
+        )
+        for name, one in rejector.by.items()
+    )
     lines = [
         "## The judge as a rejector",
         "",
@@ -56,13 +69,8 @@ def _format_rejector(rejector: Rejector) -> list[str]:
         f"over all shares; AUC: chance that a frame further off than {WRONG_MM:g} mm has a worse "
         "score than another.",
         "",
-        f"| rejected by | {' | '.join(heads)} | area mm | AUC |",
-        "|---" * (len(heads) + 3) + "|",
+        *format_table(head, cells),
     ]
-    for name, one in rejector.by.items():
-        cells = [f"{one.mean_mm[place]:.3f} ({one.p95_mm[place]:.3f})" for place in places]
-        auc = "-" if one.auc is None else f"{one.auc:.3f}"
-        lines.append(f"| {_REJECTED_BY[name]} | {' | '.join(cells)} | {one.area_mm:.3f} | {auc} |")
     point = rejector.point
     told = [f"{_percent(point.right_refused)} of {point.n_right} others"]
     if point.n_wrong:
@@ -76,40 +84,50 @@ def _format_rejector(rejector: Rejector) -> list[str]:
 
 
 def _format_reliability(levels: Sequence[Reliability]) -> list[str]:
-    lines = [
+    return [
         "## How often the bound holds",
         "",
         f"{levels[0].n_frames} OK frames of {levels[0].n_knees} knees; intervals: bootstrap over "
         "knees.",
         "",
-        "| nominal | within the judge's bound (95 %) | within what the covariance alone says "
-        "(95 %) |",
-        "|---|---|---|",
-    ]
-    lines += [
-        f"| {100.0 * one.nominal:.0f} % | {100.0 * one.observed:.1f} %{_interval(one.ci95)} | "
-        f"{100.0 * one.claimed:.1f} %{_interval(one.claimed_ci95)} |"
-        for one in levels
-    ]
-    return [*lines, ""]
+        *format_table(
+            (
+                "nominal", "within the judge's bound (95 %)",
+                "within what the covariance alone says (95 %)",
+            ),
+            (
+                (
+                    f"{100.0 * one.nominal:.0f} %",
+                    f"{100.0 * one.observed:.1f} %{_interval(one.ci95)}",
+                    f"{100.0 * one.claimed:.1f} %{_interval(one.claimed_ci95)}",
+                )
+                for one in levels
+            ),
+        ),
+        "",
+    ]  # fmt: skip
 
 
 def _format_sharpness(bounds: BoundQuality, titles: Mapping[str, str]) -> list[str]:
-    lines = [
+    cells = (
+        (titles.get(name, name), f"{one.median:.1f}", str(one.n_frames))
+        for name, one in bounds.sharpness.items()
+    )
+    return [
         "Bound over error, median; a right bound for errors in three directions has 1.8.",
         "",
-        "| situation | bound over error | OK frames |",
-        "|---|---|---|",
+        *format_table(("situation", "bound over error", "OK frames"), cells),
+        "",
     ]
-    lines += [
-        f"| {titles.get(name, name)} | {one.median:.1f} | {one.n_frames} |"
-        for name, one in bounds.sharpness.items()
-    ]
-    return [*lines, ""]
 
 
 def _format_limits(limits: Mapping[str, Efficiency], titles: Mapping[str, str]) -> list[str]:
-    lines = [
+    head = (
+        "situation", "frames", "knees", "limit", "ideal", "matched", "reached", "efficiency",
+        f"{', '.join(STEPS)} add, mm^2", "largest contribution",
+    )  # fmt: skip
+    cells = ((titles.get(name, name), *_format_limit(one)) for name, one in limits.items())
+    return [
         "## Noise limit",
         "",
         "Root mean square errors over targets and OK frames, mm. Limit: Cramer-Rao bound from the "
@@ -119,19 +137,21 @@ def _format_limits(limits: Mapping[str, Efficiency], titles: Mapping[str, str]) 
         f"squared; where it is below {LEAST_EFFICIENCY:g}, the step that adds the largest mean "
         "square.",
         "",
-        f"| situation | frames | knees | limit | ideal | matched | reached | efficiency | "
-        f"{', '.join(STEPS)} add, mm^2 | largest contribution |",
-        "|---" * 10 + "|",
+        *format_table(head, cells),
+        "",
     ]
-    for name, one in limits.items():
-        added = ", ".join(f"{one.added_mm2[step]:+.5f}" for step in STEPS)
-        largest = "-" if one.largest_step is None else _STEP_NAMES[one.largest_step]
-        lines.append(
-            f"| {titles.get(name, name)} | {one.n_frames} | {one.n_knees} | {one.limit_mm:.4f} | "
-            f"{one.ideal_mm:.4f} | {one.matched_mm:.4f} | {one.reached_mm:.4f} | "
-            f"{one.efficiency:.3f} | {added} | {largest} |"
-        )
-    return [*lines, ""]
+
+
+def _format_limit(one: Efficiency) -> tuple[str, ...]:
+    lengths_mm = one.limit_mm, one.ideal_mm, one.matched_mm, one.reached_mm
+    return (
+        str(one.n_frames),
+        str(one.n_knees),
+        *(f"{length_mm:.4f}" for length_mm in lengths_mm),
+        f"{one.efficiency:.3f}",
+        ", ".join(f"{one.added_mm2[step]:+.5f}" for step in STEPS),
+        "-" if one.largest_step is None else _STEP_NAMES[one.largest_step],
+    )
 
 
 def _percent(share: float | None) -> str:

@@ -7,7 +7,7 @@ from navapp.evaluation.methods import OURS
 from navapp.evaluation.paper.cases import Case
 from navapp.evaluation.paper.charts import draw_errors, draw_rates, draw_stages
 from navapp.evaluation.paper.rows import Row
-from navapp.evaluation.report_parts import format_mm, make_figure, render_markdown
+from navapp.evaluation.report_parts import format_mm, make_picture, render_markdown
 
 _PICTURES = (
     "The worst frame of each case that the judge calls OK: white is where the bone is, green where "
@@ -44,5 +44,5 @@ def _show(pictures: Mapping[Case, bytes], rows: Sequence[Row]) -> str:
     for case, picture in pictures.items():
         row = ours.get(case)
         told = "" if row is None else f": mean TRE of the case {format_mm(row.tre_mm)} mm"
-        figures.append(make_figure(picture, case.name + told))
+        figures.append(make_picture(picture, case.name + told))
     return "".join(figures)

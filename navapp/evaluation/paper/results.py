@@ -19,7 +19,7 @@ from navapp.evaluation.peers.rows import make_peer_rows
 from navapp.evaluation.peers.scores import read_peers
 from navapp.evaluation.peers.tables import format_peers, make_peer_csv
 from navapp.evaluation.provenance import describe_origin, name_processor
-from navapp.evaluation.report_parts import make_frames_csv
+from navapp.evaluation.report_parts import SIMULATED_NOTE, make_frames_csv
 from navapp.evaluation.scores import FrameScore
 from navapp.geometry.whole_files import write_whole
 
@@ -32,19 +32,19 @@ def write_results(folder: CampaignFolder[CaseTest], settings: TableSettings) -> 
     done = list(folder.read(is_timed=False))
     timed = done if settings.is_quick else list(folder.read(is_timed=True))
     rows = [
-        make_row(case, method, _of(case, done), _of(case, timed))
+        make_row(case, method, _select_case(case, done), _select_case(case, timed))
         for case in settings.cases
         for method in settings.methods
-        if _of(case, done)
+        if _select_case(case, done)
     ]
-    judged = [judge_method(method, _by_knee(method, done)) for method in settings.methods]
+    judged = [judge_method(method, _list_knees(method, done)) for method in settings.methods]
     findings = _examine(done)
     peers = read_peers(folder.path, settings.tests)
     peer_rows = make_peer_rows(peers, done, timed)
     tables = make_tables(
         rows,
         judged,
-        _about(settings, done, timed),
+        _describe_run(settings, done, timed),
         [*findings.to_lines(), *format_peers(peer_rows)],
         is_quick=settings.is_quick,
     )
@@ -65,24 +65,26 @@ def write_results(folder: CampaignFolder[CaseTest], settings: TableSettings) -> 
     }
 
 
-def _of(case: Case, done: Sequence[Done[CaseTest]]) -> list[Done[CaseTest]]:
+def _select_case(case: Case, done: Sequence[Done[CaseTest]]) -> list[Done[CaseTest]]:
     return [one for one in done if one.test.case == case]
 
 
-def _by_knee(method: str, done: Sequence[Done[CaseTest]]) -> list[tuple[int, Sequence[FrameScore]]]:
-    return [(one.test.seed, one.followed[method].frames) for one in done]
+def _list_knees(
+    method: str, done: Sequence[Done[CaseTest]]
+) -> list[tuple[int, Sequence[FrameScore]]]:
+    return [(one.test.seed, one.scores[method].frames) for one in done]
 
 
 def _examine(done: Sequence[Done[CaseTest]]) -> JudgeFindings:
     """Our method alone: the judge was made for it."""
     knees: dict[str, list[Sequence[FrameScore]]] = {}
     for one in done:
-        if OURS in one.followed:
-            knees.setdefault(one.test.case.situation, []).append(one.followed[OURS].frames)
+        if OURS in one.scores:
+            knees.setdefault(one.test.case.situation, []).append(one.scores[OURS].frames)
     return examine_judge(knees)
 
 
-def _about(
+def _describe_run(
     settings: TableSettings, done: Sequence[Done[CaseTest]], timed: Sequence[Done[CaseTest]]
 ) -> list[str]:
     return [
@@ -93,7 +95,7 @@ def _about(
         "age changes the fine relief of the simulated bones only: 0.10 mm (20 to 30) against "
         "0.15 mm (35 to 45), root mean square",
         *_tell_machines(timed),
-        "simulated devices; research software, not for clinical use",
+        SIMULATED_NOTE,
     ]
 
 
@@ -138,7 +140,9 @@ def _find_pictures(
     """For each case, the picture of the test with the largest error that is OK."""
     pictures = {}
     for case in settings.cases:
-        with_picture = [one for one in _of(case, done) if folder.picture_of(one.test).is_file()]
+        with_picture = [
+            one for one in _select_case(case, done) if folder.picture_of(one.test).is_file()
+        ]
         if with_picture:
             worst = max(with_picture, key=_worst_mm)
             pictures[case] = folder.picture_of(worst.test).read_bytes()
@@ -146,18 +150,18 @@ def _find_pictures(
 
 
 def _worst_mm(done: Done[CaseTest]) -> float:
-    ours = done.followed.get(OURS)
+    ours = done.scores.get(OURS)
     return 0.0 if ours is None else FrameFigures(ours.frames).ok.worst_mm or 0.0
 
 
 def make_case_csv(done: Sequence[Done[CaseTest]], what: str) -> str:
-    """Every frame of tests; `what` the names of those that followed them are: method, variant."""
+    """Every frame of the tests as CSV; `what` heads the column of names: method or variant."""
 
     def list_frames() -> Iterator[tuple[Sequence[object], FrameScore]]:
         for one in done:
             test, case = one.test, one.test.case
-            for name, followed in one.followed.items():
+            for name, scores in one.scores.items():
                 keys = case.sample, case.stage, case.situation, test.number, test.seed, name
-                yield from ((keys, frame) for frame in followed.frames)
+                yield from ((keys, frame) for frame in scores.frames)
 
     return make_frames_csv(("sample", "stage", "situation", "test", "seed", what), list_frames())

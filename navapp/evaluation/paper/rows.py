@@ -7,24 +7,28 @@ from typing import Any
 import numpy as np
 
 from navapp.evaluation.campaign import Done
-from navapp.evaluation.frame_figures import FrameFigures, find_mean, pool_frames
+from navapp.evaluation.frame_figures import (
+    FrameFigures,
+    find_mean,
+    find_percentile,
+    find_rate_hz,
+    pool_frames,
+)
 from navapp.evaluation.methods import OURS
 from navapp.evaluation.paper.cases import Case, CaseTest
 from navapp.evaluation.resampled_knees import find_mean_interval
-from navapp.evaluation.scores import Followed, FrameScore
+from navapp.evaluation.scores import FrameScore, SequenceScore
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Row:
-    """Of one case and one method."""
+    """The results of one method in one case, over all its tests."""
 
     case: Case
     method: str
     seeds: tuple[int, ...]
     figures: FrameFigures  # of all frames
-    # Frames whose errors count: of ours those that the judge calls OK; of the paper's two methods
-    # all that have a pose, because our judge is not theirs.
-    counted: FrameFigures
+    counted: FrameFigures  # `figures.select_counted(method)`
     # 95 % intervals of the means over `counted`, over tests.
     tre_ci95: tuple[float, float] | None
     overlay_ci95: tuple[float, float] | None
@@ -46,12 +50,11 @@ class Row:
     @property
     def fps(self) -> float | None:
         """One over the mean time of a frame."""
-        mean_ms = find_mean(self.times_ms)
-        return None if mean_ms is None else 1e3 / mean_ms
+        return find_rate_hz(self.times_ms)
 
     def to_json(self) -> dict[str, Any]:
         """As in `evaluate.json`."""
-        figures, counted, times_ms = self.figures, self.counted, self.times_ms
+        figures, counted = self.figures, self.counted
         return {
             "sample": self.case.sample,
             "stage": self.case.stage,
@@ -68,9 +71,7 @@ class Row:
             "wrong_and_ok": figures.n_wrong,
             "bound_coverage": figures.bound_coverage,
             "fps": self.fps,
-            "latency_ms": {
-                f"p{q}": float(np.percentile(times_ms, q)) if times_ms else None for q in (50, 95)
-            },
+            "latency_ms": {f"p{q}": find_percentile(self.times_ms, q) for q in (50, 95)},
             "registration_s": self.registration_s,
             "tests": len(self.seeds),
             "frames": figures.n_frames,
@@ -80,8 +81,7 @@ class Row:
 
 def find_ours(rows: Sequence[Row], stage: str, situation: str) -> list[Row]:
     """Those of our method in one stage and situation, of all samples."""
-    wanted = (OURS, stage, situation)
-    return [row for row in rows if (row.method, row.case.stage, row.case.situation) == wanted]
+    return [row for row in rows if row.method == OURS and row.case.place == (stage, situation)]
 
 
 def make_row(
@@ -95,15 +95,15 @@ def make_row(
         done: its tests.
         timed: tests of the pass in which times were taken.
     """
-    tests = [one.followed[method] for one in done]
+    tests = [one.scores[method] for one in done]
     figures = pool_frames(test.frames for test in tests)
-    in_time = [one.followed[method] for one in timed]
+    in_time = [one.scores[method] for one in timed]
     return Row(
         case=case,
         method=method,
         seeds=tuple(one.test.seed for one in done),
         figures=figures,
-        counted=count_errors(figures, method),
+        counted=figures.select_counted(method),
         tre_ci95=_resample(tests, method, lambda frame: frame.tre_mm),
         overlay_ci95=_resample(tests, method, lambda frame: frame.displacement_mm),
         times_ms=tuple(ms for test in in_time for ms in test.times_ms),
@@ -111,20 +111,14 @@ def make_row(
     )
 
 
-def count_errors(figures: FrameFigures, method: str) -> FrameFigures:
-    """Frames whose errors count for a method, as `Row` says."""
-    return figures.ok if method == OURS else figures.with_error
-
-
 def _resample(
-    tests: Sequence[Followed], method: str, value_of: Callable[[FrameScore], float | None]
+    tests: Sequence[SequenceScore], method: str, value_of: Callable[[FrameScore], float | None]
 ) -> tuple[float, float] | None:
     """95 % interval of the mean, by drawing tests anew (percentile bootstrap)."""
     sums, counts = list[float](), list[int]()
     for test in tests:
-        values = [
-            value_of(frame) for frame in count_errors(FrameFigures(test.frames), method).frames
-        ]
+        counted = FrameFigures(test.frames).select_counted(method)
+        values = [value_of(frame) for frame in counted.frames]
         known = [value for value in values if value is not None]
         sums.append(float(np.sum(known)))
         counts.append(len(known))

@@ -39,10 +39,10 @@ class TableSettings:
 
     @classmethod
     def from_json(cls, content: Mapping[str, Any]) -> "TableSettings":
-        """Of such an object.
+        """Settings from what `to_json` returned.
 
         Raises:
-            KeyError, TypeError: it is none.
+            KeyError, TypeError: keys are missing, or of a wrong type.
         """
         by_name = {case.name: case for case in ALL_CASES}
         return cls(

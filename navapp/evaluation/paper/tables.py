@@ -47,7 +47,7 @@ def make_tables(
     rows: Sequence[Row],
     judged: Sequence[JudgeFigures],
     about: Sequence[str],
-    of_the_judge: Sequence[str] = (),
+    sections: Sequence[str] = (),
     *,
     is_quick: bool,
 ) -> str:
@@ -57,7 +57,7 @@ def make_tables(
         rows: of all cases and methods.
         judged: of all methods.
         about: how it was made, a line each.
-        of_the_judge: further lines on it.
+        sections: further ones, a line each.
         is_quick: it is a short look, and says so.
     """
     parts = ["# Evaluation on simulated knees", ""]
@@ -71,7 +71,7 @@ def make_tables(
         if shown:
             cells = (_format_case(case, by_case) for case in shown)
             parts += [f"## Table {number}: {sample.title}", "", *format_table(_HEAD, cells), ""]
-    parts += [*_format_stages(rows), *_format_judged(judged), *of_the_judge]
+    parts += [*_format_stages(rows), *_format_judged(judged), *sections]
     parts += ["## Where the paper contradicts itself", "", *(f"- {one}" for one in CONTRADICTIONS)]
     return "\n".join(parts) + "\n"
 
@@ -162,7 +162,7 @@ def _format_judged(judged: Sequence[JudgeFigures]) -> list[str]:
 
 
 def _format_one_judged(one: JudgeFigures) -> tuple[str, ...]:
-    figures, (by_frames, by_knees) = one.figures, one.wrong_at_most
+    figures, (by_frames, by_knees) = one.figures, one.find_upper_limits()
     return (
         f"`{one.method}`", str(figures.n_frames), str(figures.n_ok), str(one.n_knees),
         str(figures.n_wrong), f"{100.0 * by_frames:.3f} %", f"{100.0 * by_knees:.1f} %",

@@ -5,9 +5,8 @@ from dataclasses import asdict, dataclass
 from itertools import product
 from typing import Any
 
-import numpy as np
-
 from navapp.evaluation.campaign import Done
+from navapp.evaluation.frame_figures import find_percentile
 from navapp.evaluation.methods import OURS
 from navapp.evaluation.paper.cases import SITUATIONS, STAGE_NAMES, CaseTest, SituationName
 from navapp.evaluation.peers.scores import PeerFrame, PeerTest
@@ -21,7 +20,7 @@ _Frames = Mapping[str, tuple[PeerFrame, ...]]
 
 @dataclass(frozen=True, slots=True)
 class PeerRow:
-    """Of one stage, situation and tracker."""
+    """The results of one tracker in one stage and situation."""
 
     stage: str
     situation: SituationName
@@ -53,11 +52,7 @@ def make_peer_rows(
     our_times = {one.test: _take_ours(one) for one in timed}
     rows = []
     for stage, situation in product(STAGE_NAMES, SITUATIONS):
-        tests = [
-            one
-            for one in peers
-            if (one.test.case.stage, one.test.case.situation) == (stage, situation)
-        ]
+        tests = [one for one in peers if one.test.case.place == (stage, situation)]
         frames = [{**ours.get(one.test, {}), **one.frames} for one in tests]
         times = [{**our_times.get(one.test, {}), **one.frames} for one in tests]
         names = dict.fromkeys(name for one in frames for name in one)
@@ -75,10 +70,10 @@ def _select(name: str, tests: Sequence[_Frames]) -> list[tuple[PeerFrame, ...]]:
 
 def _take_ours(done: Done[CaseTest]) -> dict[str, tuple[PeerFrame, ...]]:
     """Ours twice: with a pose only where the judge says OK, and with every pose."""
-    followed = done.followed.get(OURS)
-    if followed is None:
+    scores = done.scores.get(OURS)
+    if scores is None:
         return {}
-    frames = [(one, one.total_ms if one.was_followed else None) for one in followed.frames]
+    frames = [(one, one.total_ms if one.was_followed else None) for one in scores.frames]
     ok = tuple(PeerFrame(one.index, one.tre_mm if one.is_ok else None, ms) for one, ms in frames)
     every = tuple(PeerFrame(one.index, one.tre_mm, ms) for one, ms in frames)
     return {_OK: ok, _EVERY: every}
@@ -100,9 +95,9 @@ def _make_row(
         tracker=tracker,
         n_tests=len(tests),
         n_frames=len(frames),
-        tre_median_mm=float(np.median(errors_mm)) if errors_mm else None,
-        tre_p95_mm=float(np.percentile(errors_mm, 95)) if errors_mm else None,
+        tre_median_mm=find_percentile(errors_mm, 50.0),
+        tre_p95_mm=find_percentile(errors_mm, 95.0),
         n_within=sum(error_mm <= WRONG_MM for error_mm in errors_mm),
         n_no_pose=len(frames) - len(errors_mm),
-        p50_ms=float(np.median(times_ms)) if times_ms else None,
+        p50_ms=find_percentile(times_ms, 50.0),
     )

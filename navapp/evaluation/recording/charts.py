@@ -13,7 +13,7 @@ _LEAST_MM = 1e-3  # of the logarithmic axes
 
 def draw_errors_over_frames(studied: Studied) -> str:
     """Each method's error in every picture, coloured by the judge's word; SVG."""
-    methods = list(studied.followed)
+    methods = list(studied.scores)
 
     def draw(figure: Any) -> None:
         for number, method in enumerate(methods):
@@ -66,7 +66,7 @@ def draw_errors_beside_bounds(studied: Studied, method: Method) -> str:
 
 
 def _measured(studied: Studied, method: Method) -> list[FrameScore]:
-    frames = studied.followed[method].frames
+    frames = studied.scores[method].frames
     return [one for one in frames if one.tre_mm is not None]
 
 

@@ -19,8 +19,8 @@ from navapp.evaluation.report_parts import (
     format_number,
     format_share,
     format_table,
-    make_figure,
     make_frames_csv,
+    make_picture,
     render_markdown,
 )
 from navapp.evaluation.scores import FrameScore
@@ -158,15 +158,15 @@ def _show_worst(one: Studied) -> list[str]:
     ]
     for frame, picture in one.pictures:
         told = f"picture {frame.index}, {frame.status}: {format_mm(frame.tre_mm)} mm"
-        parts.append(make_figure(picture, told))
+        parts.append(make_picture(picture, told))
     return parts
 
 
 def _make_csv(studied: Sequence[Studied]) -> str:
     def list_frames() -> Iterator[tuple[Sequence[object], FrameScore]]:
         for one in studied:
-            for method, followed in one.followed.items():
-                for frame in followed.frames:
+            for method, scores in one.scores.items():
+                for frame in scores.frames:
                     yield (one.name, method, frame.index in one.known), frame
 
     return make_frames_csv(("recording", "method", "has_truth"), list_frames())

@@ -4,13 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
-from navapp.evaluation.frame_figures import FrameFigures, find_mean
-from navapp.evaluation.paper.rows import count_errors
+from navapp.evaluation.frame_figures import FrameFigures, find_percentile, find_rate_hz
 from navapp.evaluation.recording.study import Studied
 from navapp.evaluation.recording.truth_files import DivotTruth
-from navapp.evaluation.scores import Followed, FrameScore
+from navapp.evaluation.scores import FrameScore, SequenceScore
 from navapp.tracking import Method
 from navapp.values import Status
 
@@ -26,20 +23,19 @@ class VerdictCount:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RecordingRow:
-    """Of one recording and one method."""
+    """The results of one method on one recording."""
 
     name: str  # of the recording
     stage: str
     method: Method
     figures: FrameFigures  # of all frames after the one that is registered in
     known: FrameFigures  # of them, those with a known truth
-    # whose errors count: of ours OK frames, of the paper's two methods all with a pose.
-    counted: FrameFigures
+    counted: FrameFigures  # `known.select_counted(method)`
     # The truth is touched points: these are no targets of the stage and carry errors of their own,
     # so that nothing is said of the bound.
     is_touched: bool
     registration_s: float | None
-    times_ms: tuple[float, ...]  # of frames in which a bone was followed
+    times_ms: tuple[float, ...]  # of frames in which a bone was scores
 
     @property
     def verdicts(self) -> dict[str, VerdictCount]:
@@ -61,12 +57,11 @@ class RecordingRow:
     @property
     def fps(self) -> float | None:
         """One over the mean time of a frame."""
-        mean_ms = find_mean(self.times_ms)
-        return None if mean_ms is None else 1e3 / mean_ms
+        return find_rate_hz(self.times_ms)
 
     def to_json(self) -> dict[str, Any]:
         """As in `evaluate.json`."""
-        times_ms, counted = self.times_ms, self.counted
+        counted = self.counted
         return {
             "sample": self.name,
             "stage": self.stage,
@@ -92,9 +87,7 @@ class RecordingRow:
                 for status, one in self.verdicts.items()
             },
             "fps": self.fps,
-            "latency_ms": {
-                f"p{q}": float(np.percentile(times_ms, q)) if times_ms else None for q in (50, 95)
-            },
+            "latency_ms": {f"p{q}": find_percentile(self.times_ms, q) for q in (50, 95)},
             "registration_s": self.registration_s,
             "tests": 1,
             "frames": self.figures.n_frames,
@@ -105,21 +98,21 @@ class RecordingRow:
 
 def make_rows(studied: Studied) -> list[RecordingRow]:
     """One for each method."""
-    return [_make_row(studied, method, followed) for method, followed in studied.followed.items()]
+    return [_make_row(studied, method, scores) for method, scores in studied.scores.items()]
 
 
-def _make_row(studied: Studied, method: Method, followed: Followed) -> RecordingRow:
-    known = FrameFigures(tuple(one for one in followed.frames if one.index in studied.known))
+def _make_row(studied: Studied, method: Method, scores: SequenceScore) -> RecordingRow:
+    known = FrameFigures(tuple(one for one in scores.frames if one.index in studied.known))
     return RecordingRow(
         name=studied.name,
         stage=studied.stage,
         method=method,
-        figures=FrameFigures(followed.frames),
+        figures=FrameFigures(scores.frames),
         known=known,
-        counted=count_errors(known, method),
+        counted=known.select_counted(method),
         is_touched=isinstance(studied.truth, DivotTruth),
-        registration_s=followed.registration_s,
-        times_ms=tuple(followed.times_ms),
+        registration_s=scores.registration_s,
+        times_ms=tuple(scores.times_ms),
     )
 
 

@@ -14,7 +14,7 @@ from navapp.evaluation.methods import OURS
 from navapp.evaluation.recording.divots import measure_divots
 from navapp.evaluation.recording.other_tracker import SolvedFrames, find_poses, solve_frames
 from navapp.evaluation.recording.truth_files import DivotTruth, PoseTruth, Truth
-from navapp.evaluation.scores import Followed, FrameScore
+from navapp.evaluation.scores import FrameScore, SequenceScore
 from navapp.evaluation.scoring import score_answers
 from navapp.evaluation.sequence import KnownSequence
 from navapp.evaluation.worst_frame import draw_frame
@@ -134,7 +134,7 @@ class Studied:
     truth: Truth
     has_times: bool
     known: frozenset[int]  # pictures whose poses can be scored
-    followed: dict[Method, Followed]  # their scores have the pictures' own numbers
+    scores: dict[Method, SequenceScore]  # with the pictures' own numbers
     leading: Method  # ours, unless it was not asked for
     solved: SolvedFrames | None  # of another tracker, with the leading method's poses
     pictures: tuple[tuple[FrameScore, bytes], ...]  # its worst frames
@@ -148,7 +148,7 @@ def study(given: Study, frames: RecordedFrames, methods: Sequence[Method]) -> St
         SequenceError: a picture cannot be read.
     """
     answers = {method: follow(given.to_sequence(frames), method) for method in methods}
-    # Ours leads, because its judge tells which poses may be solved with.
+    # The truth of another tracker is solved with poses that the judge calls OK: ours, if it ran.
     leading: Method = OURS if OURS in answers else methods[0]
     poses, solved = _find_truth(given, frames, answers[leading])
     sequence = given.to_sequence(frames, poses)
@@ -162,7 +162,7 @@ def study(given: Study, frames: RecordedFrames, methods: Sequence[Method]) -> St
         given.truth,
         frames.has_times,
         _find_known(given, frames.numbers, poses),
-        {method: _number(one, frames.numbers) for method, one in scored.items()},
+        {method: _use_picture_numbers(one, frames.numbers) for method, one in scored.items()},
         leading,
         solved,
         tuple(_draw_worst(sequence, answers[leading], scored[leading], frames.numbers)),
@@ -196,26 +196,26 @@ def _find_known(
 
 def _score(
     given: Study, sequence: KnownSequence, answers: Answers, numbers: Sequence[int]
-) -> Followed:
-    followed = score_answers(sequence, answers, has_budget=False)
+) -> SequenceScore:
+    scores = score_answers(sequence, answers, has_budget=False)
     if not isinstance(given.truth, DivotTruth):
-        return followed
+        return scores
     touched_mm = measure_divots(answers.poses, numbers, given.truth)
-    frames = (replace(one, tre_mm=touched_mm[one.index]) for one in followed.frames)
-    return replace(followed, frames=tuple(frames))
+    frames = (replace(one, tre_mm=touched_mm[one.index]) for one in scores.frames)
+    return replace(scores, frames=tuple(frames))
 
 
-def _number(followed: Followed, numbers: Sequence[int]) -> Followed:
-    """With the numbers of the pictures instead of their places."""
-    frames = tuple(replace(one, index=numbers[one.index]) for one in followed.frames)
-    return replace(followed, frames=frames)
+def _use_picture_numbers(scores: SequenceScore, numbers: Sequence[int]) -> SequenceScore:
+    """Scores with the pictures' numbers as index, instead of their places."""
+    frames = tuple(replace(one, index=numbers[one.index]) for one in scores.frames)
+    return replace(scores, frames=frames)
 
 
 def _draw_worst(
-    sequence: KnownSequence, answers: Answers, followed: Followed, numbers: Sequence[int]
+    sequence: KnownSequence, answers: Answers, scores: SequenceScore, numbers: Sequence[int]
 ) -> Iterator[tuple[FrameScore, bytes]]:
     """The largest errors that the judge calls OK; of all poses when it calls none so."""
-    known = [one for one in followed.frames if one.tre_mm is not None]
+    known = [one for one in scores.frames if one.tre_mm is not None]
     chosen = [one for one in known if one.is_ok] or known
     chosen.sort(key=lambda one: one.tre_mm or 0.0, reverse=True)
     for one in chosen[:_N_PICTURES]:

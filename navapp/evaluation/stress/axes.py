@@ -195,7 +195,8 @@ _RIG_AXES = (
 AXES: dict[str, Axis] = {
     axis.name: axis for axis in (*_CAUSES, *_PICTURE_AXES, *_PLAN_AXES, *_RIG_AXES)
 }
-# No test and no choice of a constant uses the seeds from here on; so many belong to an axis.
+# First seed of the stress matrix, and how many seeds an axis has. No other test uses them, and no
+# constant was set on them.
 FIRST_STRESS_SEED, MOST_KNEES = 136_001, 100
 
 

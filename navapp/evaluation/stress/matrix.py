@@ -107,7 +107,7 @@ class StressSettings:
 
     @property
     def has_details(self) -> bool:
-        """None are shown."""
+        """False: its report shows neither worst frames nor error budgets."""
         return False
 
     def render(self, test: StressTest, n_frames: int | None = None) -> KnownSequence:

@@ -9,7 +9,7 @@ from navapp.evaluation.campaign import CampaignFolder, Done
 from navapp.evaluation.judge.figures import JudgeFigures, judge_method
 from navapp.evaluation.methods import OURS
 from navapp.evaluation.provenance import describe_origin
-from navapp.evaluation.report_parts import make_frames_csv, render_markdown
+from navapp.evaluation.report_parts import SIMULATED_NOTE, make_frames_csv, render_markdown
 from navapp.evaluation.scores import FrameScore
 from navapp.evaluation.stress.axes import AXES
 from navapp.evaluation.stress.bars import check_blur
@@ -28,7 +28,9 @@ def write_stress(folder: CampaignFolder[StressTest], settings: StressSettings) -
     axes = [make_axis_rows(AXES[name], done) for name in settings.axes]
     axes = [one for one in axes if one.rows]
     judged = _judge(done)
-    tables = make_stress_tables(axes, judged, _about(settings, done), is_quick=settings.is_quick)
+    tables = make_stress_tables(
+        axes, judged, _describe_run(settings, done), is_quick=settings.is_quick
+    )
     write_whole(folder.path / "stress.md", tables.encode())
     charts = [_draw(one) for one in axes]
     report = make_html("Stress matrix", [render_markdown(tables), "<h2>Charts</h2>", *charts])
@@ -53,20 +55,20 @@ def _judge(done: Sequence[Done[StressTest]]) -> JudgeFigures:
     return judge_method(
         OURS,
         (
-            (one.test.seed, one.followed[OURS].frames)
+            (one.test.seed, one.scores[OURS].frames)
             for one in done
             if not one.test.axis.is_hidden(one.test.level)
         ),
     )
 
 
-def _about(settings: StressSettings, done: Sequence[Done[StressTest]]) -> list[str]:
+def _describe_run(settings: StressSettings, done: Sequence[Done[StressTest]]) -> list[str]:
     return [
         describe_origin(),
         f"{len(done)} of {len(settings.tests)} sequences: {settings.n_knees} knees a level, the "
         f"same at all levels of an axis, {settings.n_frames} frames each that count; first seed "
         f"{settings.first_seed}",
-        "simulated devices; research software, not for clinical use",
+        SIMULATED_NOTE,
     ]
 
 
@@ -109,7 +111,7 @@ def _make_csv(done: Sequence[Done[StressTest]]) -> str:
     def list_frames() -> Iterator[tuple[Sequence[object], FrameScore]]:
         for one in done:
             test = one.test
-            for frame in one.followed[OURS].frames:
+            for frame in one.scores[OURS].frames:
                 counts = test.counts(frame.index)
                 keys = test.axis_name, f"{test.level:g}", test.knee, test.seed, counts
                 yield keys, frame

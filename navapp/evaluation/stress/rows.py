@@ -18,7 +18,7 @@ KEPT_SHARE, ENDED_SHARE = 0.9, 0.5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LevelRow:
-    """Of one level, over its knees."""
+    """The results at one level of an axis, over all its knees."""
 
     level: float
     n_knees: int
@@ -137,7 +137,7 @@ def make_axis_rows(axis: Axis, done: Sequence[Done[StressTest]]) -> AxisRows:
 
 def list_counted(done: Done[StressTest]) -> list[FrameScore]:
     """Frames of a test that show what its level says."""
-    return [frame for frame in done.followed[OURS].frames if done.test.counts(frame.index)]
+    return [frame for frame in done.scores[OURS].frames if done.test.counts(frame.index)]
 
 
 def _make_row(axis: Axis, level: float, done: Sequence[Done[StressTest]]) -> LevelRow:
@@ -149,7 +149,7 @@ def _make_row(axis: Axis, level: float, done: Sequence[Done[StressTest]]) -> Lev
         level=level,
         n_knees=len(done),
         figures=figures,
-        every=pool_frames(one.followed[OURS].frames for one in done),
+        every=pool_frames(one.scores[OURS].frames for one in done),
         reason=reason,
         reason_share=n_told / max(len(refused), 1),
         is_hidden=axis.is_hidden(level),

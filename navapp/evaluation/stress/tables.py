@@ -90,7 +90,7 @@ def _format_end(one: AxisRows) -> tuple[str, ...]:
 
 
 def _format_wrong(axes: Sequence[AxisRows], judged: JudgeFigures) -> list[str]:
-    figures, (by_frames, by_knees) = judged.figures, judged.wrong_at_most
+    figures, (by_frames, by_knees) = judged.figures, judged.find_upper_limits()
     lines = [
         f"Over all levels that pictures can show: {figures.n_wrong} of {figures.n_ok} OK frames, "
         f"of {figures.n_frames}, are wrong; in {judged.n_wrong_knees} of {judged.n_knees} knees. "

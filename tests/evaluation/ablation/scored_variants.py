@@ -5,10 +5,12 @@ from collections.abc import Sequence
 from navapp.evaluation.campaign import Done
 from navapp.evaluation.methods import VARIANTS
 from navapp.evaluation.paper.cases import Case, list_tests
-from navapp.evaluation.scores import Followed
+from navapp.evaluation.scores import SequenceScore
 
 
-def done_by_variants(cases: Sequence[Case], whole: Followed, **others: Followed) -> list[Done]:
+def done_by_variants(
+    cases: Sequence[Case], whole: SequenceScore, **others: SequenceScore
+) -> list[Done]:
     """A test of each case; variants without frames of their own are as the whole method.
 
     In the names of `others` an underscore stands for a blank: `without_judge`.

@@ -13,7 +13,7 @@ from tests.evaluation.stressed import stressed
 
 
 def by_knee(tests: Sequence[Done], method: str) -> list[tuple[int, Sequence[FrameScore]]]:
-    return [(one.test.seed, one.followed[method].frames) for one in tests]
+    return [(one.test.seed, one.scores[method].frames) for one in tests]
 
 
 @pytest.mark.parametrize(("k", "n"), [(0, 1), (0, 300), (1, 300), (7, 12000), (11, 12)])
@@ -39,7 +39,7 @@ def test_frames_and_knees_are_counted() -> None:
     assert (judged.figures.n_frames, judged.figures.n_ok, judged.n_knees) == (9, 6, 3)
     assert (judged.figures.n_wrong, judged.n_wrong_knees) == (3, 2)
     assert judged.figures.bound_coverage == pytest.approx(2 / 6)
-    by_frames, by_knees = judged.wrong_at_most
+    by_frames, by_knees = judged.find_upper_limits()
     assert by_frames == pytest.approx(beta.ppf(0.95, 4, 3))
     assert by_knees == pytest.approx(beta.ppf(0.95, 3, 1))
     told = judged.to_json()
@@ -55,7 +55,7 @@ def test_a_knee_counts_once_at_however_many_levels() -> None:
 
 def test_nothing_ok_says_nothing() -> None:
     judged = judge_method("icp", by_knee(done(followed(score(5.0, "LOST"))), "icp"))
-    assert (judged.figures.n_ok, judged.figures.bound_coverage, judged.wrong_at_most) == (
+    assert (judged.figures.n_ok, judged.figures.bound_coverage, judged.find_upper_limits()) == (
         0,
         None,
         (1.0, 1.0),

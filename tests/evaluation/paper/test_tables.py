@@ -18,7 +18,7 @@ def tables_of(tests, *, methods=METHODS, is_quick=False) -> str:
         of_case = [one for one in tests if one.test.case == case]
         rows += [make_row(case, method, of_case, of_case) for method in methods]
     judged = [
-        judge_method(method, [(one.test.seed, one.followed[method].frames) for one in tests])
+        judge_method(method, [(one.test.seed, one.scores[method].frames) for one in tests])
         for method in methods
     ]
     return make_tables(rows, judged, ["made here"], is_quick=is_quick)

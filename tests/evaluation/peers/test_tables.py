@@ -21,7 +21,7 @@ def test_a_row_reads_as_the_figures_are() -> None:
         "| drilling | the patient moves | none | 1 | 4 | - | - | 0.0 % | 100.0 % | 30 |",
     ]
     text = " ".join(lines)
-    assert "starts from the pose that ours found in the first frame" in text
+    assert "starts from our first pose that is OK" in text
     assert "never helped again" in text
 
 
