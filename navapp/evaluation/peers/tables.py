@@ -8,13 +8,14 @@ from navapp.evaluation.peers.scores import PeerTest
 from navapp.evaluation.report_parts import format_number, format_table, make_csv
 
 _ABOUT = (
-    "Other people's trackers on the same frames, all samples of a stage and situation together. A "
-    "peer has no registration of its own: it starts from our first pose that is OK (of the fifth "
-    "search also a DEGRADED one), and is never helped again; one that has lost the bone goes on "
-    "from its last pose. It gets the same rig, the same surface of the bone, and no truth. TRE: over the frames with a "
-    "pose. Within 1 mm and no pose: of all counted frames. A peer has no judge: a pose that is far "
-    "off counts like any other. ms: median time of a frame, taken while nothing else ran: of a "
-    "peer until it has the pose, of ours with judge, foreground and overlay as well."
+    "Other people's trackers on the same frames, all samples of a stage and situation together. A"
+    " peer has no registration of its own: it starts from our first pose that is OK (of the fifth"
+    " search also a DEGRADED one), and is never helped again; one that has lost the bone goes on "
+    "from its last pose. It gets the same rig, the same surface of the bone, and no truth. TRE: "
+    "over the frames with a pose. Within 1 mm and no pose: of all counted frames. A peer has no "
+    "judge: a pose that is far off counts like any other. ms: median time of a frame, taken while"
+    " nothing else ran: of a peer until it has the pose, of ours with judge, foreground and "
+    "overlay as well."
 )
 
 
