@@ -69,7 +69,14 @@ def make_tables(
         cases = [Case(name, stage, situation) for stage in STAGE_NAMES for situation in SITUATIONS]
         shown = [case for case in cases if any(row.case == case for row in rows)]
         if shown:
-            cells = (_format_case(case, by_case) for case in shown)
+            firsts = {case.stage: case for case in reversed(shown)}
+            cells = (
+                (
+                    _STAGES[case.stage] if case is firsts[case.stage] else "",
+                    *_format_case(case, by_case),
+                )
+                for case in shown
+            )
             parts += [f"## Table {number}: {sample.title}", "", *format_table(_HEAD, cells), ""]
     parts += [*_format_stages(rows), *_format_judged(judged), *sections]
     parts += ["## Where the paper contradicts itself", "", *(f"- {one}" for one in CONTRADICTIONS)]
@@ -79,7 +86,6 @@ def make_tables(
 def _format_case(case: Case, rows: dict[tuple[Case, str], Row]) -> tuple[str, ...]:
     told = find_published(case)
     return (
-        _STAGES[case.stage] if case.situation == "registration" else "",
         SITUATIONS[case.situation].title,
         f"{told.icp_mm:.2f}, {told.icp_fps:.0f}",
         _format_other(rows.get((case, "icp"))),

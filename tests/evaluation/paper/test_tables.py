@@ -98,6 +98,7 @@ def test_only_chosen_cases_and_samples_are_shown() -> None:
     assert "## Table 2: woman" in text
     assert "## Table 1" not in text
     assert len(tables_in(text)[0]) == 3
+    assert tables_in(text)[0][2][0] == "position of the implant", "on the stage's first row"
 
 
 @pytest.mark.parametrize(
