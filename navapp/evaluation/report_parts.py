@@ -14,8 +14,6 @@ _COLUMNS = (
 )  # fmt: skip
 _CLAIMED_COLUMNS = tuple(f"claimed_{100.0 * level:.0f}_mm" for level in LEVELS)
 _BUDGET_COLUMNS = ("limit_mm", "ideal_mm", "matched_mm", "reached_mm")
-
-
 # The last line of what is told of a run.
 SIMULATED_NOTE = "simulated devices; research software, not for clinical use"
 

@@ -26,17 +26,16 @@ NOISE_VARIANCE_RATIO = 0.57**2
 # glossy bones show more than femurs.
 TOLERATED_VARIANCE_RATIO = 0.65**2
 
-
-def limit_kernel(settings: BimccSettings, model: RegistrationModel) -> BimccSettings:
-    """The settings, with no kernel wider than `model.widest_kernel_mm`."""
-    return settings._replace(widest_mm=min(settings.widest_mm, model.widest_kernel_mm))
-
-
 OnMeasured = Callable[[Measurement, RigidTransform], object]
 
 
 def ignore(*_: object) -> None:
     """Does nothing: the default of callbacks."""
+
+
+def limit_kernel(settings: BimccSettings, model: RegistrationModel) -> BimccSettings:
+    """The settings, with no kernel wider than `model.widest_kernel_mm`."""
+    return settings._replace(widest_mm=min(settings.widest_mm, model.widest_kernel_mm))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

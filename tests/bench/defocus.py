@@ -1,4 +1,4 @@
-"""How smooth pictures are in and out of focus: what sets the limit of PICTURES_DEFOCUSED.
+"""How smooth pictures are in and out of focus, beside the limit of PICTURES_DEFOCUSED.
 
 usage: python -m tests.bench.defocus [--knees N] [--first SEED]
 

@@ -35,7 +35,7 @@ class RecordingRow:
     # so that nothing is said of the bound.
     is_touched: bool
     registration_s: float | None
-    times_ms: tuple[float, ...]  # of frames in which a bone was scores
+    times_ms: tuple[float, ...]  # of frames in which a bone was followed
 
     @property
     def verdicts(self) -> dict[str, VerdictCount]:

@@ -49,9 +49,12 @@ def test_it_looks_around_a_prediction_from_which_nothing_answers() -> None:
 def test_both_threads_find_what_one_alone_finds(monkeypatch) -> None:
     a = room()
     frame = off(a, (0.8, -0.6, 0.7, 0.01, -0.01, 0.005))
-    places = a.tracker.buried._step_from(frame, [frame.start] * 3)
+    true = a.tracker.rectify_pose(a.truth(a.frames[0]))
+    starts = [frame.start, true, frame.start.move((0.1, 0, 0, 0, 0, 0), (0, 0, 0))]
+    places = a.tracker.buried._step_from(frame, starts)
     monkeypatch.setattr(buried, "map_both", lambda job, items, _: [job(item) for item in items])
-    alone = a.tracker.buried._step_from(frame, [frame.start] * 3)
+    alone = a.tracker.buried._step_from(frame, starts)
+    assert len(places) == 3
     assert [place.score for place in places] == [place.score for place in alone]
     for one, other in zip(places, alone, strict=True):
         np.testing.assert_array_equal(one.fit.pose.matrix, other.fit.pose.matrix)
